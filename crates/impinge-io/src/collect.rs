@@ -4,10 +4,11 @@
 use std::ops::Range;
 
 use crate::bodies::{NamedMesh, PartName, Parts};
-use crate::error::{Error, Name, Place};
+use crate::error::{Error, Name, Place, shown};
 use crate::mesh::{Elements, Mesh, Positions};
 use crate::options::{Prefer, ReadOptions, Summary};
 use crate::polygon::mend;
+use crate::text::Line;
 
 /// A mesh being read.
 #[derive(Debug)]
@@ -26,6 +27,8 @@ pub(crate) struct Collector<'a> {
     /// Nodes with a mesh outside the scene that is read.
     pub n_out_of_scene: u64,
     n_bytes_beyond: u64,
+    n_unknown_lines: u64,
+    first_unknown_line: Option<(u64, String)>,
     pub unit: Option<&'static str>,
     /// The corners of the current polygon or strip; its memory is reused.
     pub corners: Vec<u32>,
@@ -46,6 +49,8 @@ impl<'a> Collector<'a> {
             n_at_rest: 0,
             n_out_of_scene: 0,
             n_bytes_beyond: 0,
+            n_unknown_lines: 0,
+            first_unknown_line: None,
             unit: None,
             corners: Vec::new(),
             parts: Parts::default(),
@@ -125,6 +130,13 @@ impl<'a> Collector<'a> {
         }
     }
 
+    /// Counts a line whose first word is not known.
+    pub(crate) fn unknown(&mut self, line: Line<'_>) {
+        self.n_unknown_lines += 1;
+        let first = &mut self.first_unknown_line;
+        first.get_or_insert_with(|| (line.number, shown(line.bytes)));
+    }
+
     /// All triangles so far belong to no part.
     pub(crate) fn forget_parts(&mut self) {
         self.parts = Parts::default();
@@ -200,6 +212,8 @@ impl<'a> Collector<'a> {
             n_out_of_scene: self.n_out_of_scene,
             n_parts_joined: self.parts.len() as u64,
             n_bytes_beyond: self.n_bytes_beyond,
+            n_unknown_lines: self.n_unknown_lines,
+            first_unknown_line: self.first_unknown_line,
             unit: self.unit,
         };
         Ok((mesh, summary))

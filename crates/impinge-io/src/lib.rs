@@ -80,5 +80,6 @@ pub use sequence::{Sequence, SequenceFormat, are_numbered};
 pub use table::{Cell, Column, ELEMENTS, Holds, KIND, Table, TableFormat, impact_columns};
 pub use write::{
     AtomicFile, ColoredMesh, Pc2Writer, Polylines, remove_temporary_files, write_glb, write_obj,
-    write_ply, write_polylines_obj, write_polylines_ply, write_polylines_vtu, write_stl, write_vtu,
+    write_plain_ply, write_ply, write_polylines_obj, write_polylines_ply, write_polylines_vtu,
+    write_stl, write_vtu,
 };

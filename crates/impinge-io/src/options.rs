@@ -53,7 +53,7 @@ impl ReadOptions {
 }
 
 /// What a reader changed or skipped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct Summary {
     /// Polygons of four corners or more, each of which became several triangles. If it is 0,
@@ -82,6 +82,10 @@ pub struct Summary {
     /// Bytes after the data that the header announces, unless they are white space, zeros and
     /// comments alone. They were not read.
     pub n_bytes_beyond: u64,
+    /// Lines of an OBJ file skipped, because their first word is not known.
+    pub n_unknown_lines: u64,
+    /// The number of the first of them, counted from 1, and its beginning in quotes.
+    pub first_unknown_line: Option<(u64, String)>,
 }
 
 impl Summary {
@@ -90,6 +94,10 @@ impl Summary {
     pub fn notes(&self) -> Vec<String> {
         let unit = self.unit.map(|unit| {
             format!("its unit is the {unit}; numbers are read as they are, whatever the unit of other files")
+        });
+        let unknown = self.first_unknown_line.as_ref().map(|(number, line)| {
+            let n = grouped(self.n_unknown_lines);
+            format!("lines skipped, whose first word is not known: {n}, the first of them line {number}, {line}")
         });
         let counts = [
             (
@@ -123,7 +131,7 @@ impl Summary {
         ];
         let counts = counts.into_iter().filter(|&(n, _)| n > 0);
         let counts = counts.map(|(n, what)| format!("{what}: {}", grouped(n)));
-        unit.into_iter().chain(counts).collect()
+        unit.into_iter().chain(counts).chain(unknown).collect()
     }
 }
 

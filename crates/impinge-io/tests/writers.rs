@@ -8,7 +8,7 @@ use std::path::Path;
 use common::{positions, surface, volume};
 use impinge_io::{
     ColoredMesh, Elements, Error, Mesh, Pc2Writer, Positions, Prefer, ReadOptions, Sequence, read,
-    read_with_summary, write_glb, write_ply, write_vtu,
+    read_with_summary, write_glb, write_plain_ply, write_ply, write_vtu,
 };
 
 const RED: [u8; 3] = [220, 40, 30];
@@ -398,6 +398,45 @@ fn pc2_is_read_back() {
         );
     }
     assert_eq!(std::fs::metadata(&path).unwrap().len(), 32 + 4 * 5 * 12);
+}
+
+#[test]
+fn names_may_be_as_long_as_files_may_have_them() {
+    let folder = tempfile::tempdir().unwrap();
+    // Of bytes, and of characters of three bytes.
+    for name in ["n".repeat(251), "\u{4e00}".repeat(83)] {
+        let path = folder.path().join(name + ".ply");
+        write_ply(&path, &[colored(&surface(false), None)]).unwrap();
+        assert_eq!(load(&path), surface(false));
+    }
+}
+
+#[test]
+fn plain_files_have_positions_and_faces_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plain.ply");
+    for wide in [false, true] {
+        let mesh = surface(wide);
+        let Elements::Triangles(faces) = &mesh.elements else {
+            panic!("triangles")
+        };
+        write_plain_ply(&path, &mesh.positions, faces).unwrap();
+        assert_eq!(load(&path), mesh);
+        let bytes = std::fs::read(&path).unwrap();
+        let size = if wide { 8 } else { 4 };
+        let data = 3 * size * mesh.n_vertices() + 13 * faces.len();
+        let float = if wide { "double" } else { "float" };
+        let header = format!(
+            "ply\nformat binary_little_endian 1.0\ncomment written by impinge\nelement vertex {}\nproperty {float} x\n\
+             property {float} y\nproperty {float} z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+            mesh.n_vertices(),
+            faces.len()
+        );
+        assert_eq!(
+            String::from_utf8_lossy(&bytes[..bytes.len() - data]),
+            header
+        );
+    }
 }
 
 #[cfg(unix)]

@@ -7,8 +7,8 @@ use std::path::Path;
 
 use impinge_check::{Counts, FixError, FixOptions, Fixed, Place, Repair, Report, Row, fix_mesh};
 use impinge_io::{
-    Cell, ColoredMesh, ELEMENTS, Elements, Mesh, ReadOptions, Summary, printable,
-    read_bytes_with_summary, read_with_summary, write_obj, write_ply, write_stl,
+    Cell, ELEMENTS, Elements, Mesh, ReadOptions, Summary, printable, read_bytes_with_summary,
+    read_with_summary, write_obj, write_plain_ply, write_stl,
 };
 use serde_json::{Map, Value, json};
 
@@ -102,26 +102,16 @@ fn read_mesh(args: &FixArgs) -> Result<(Mesh, Summary), Error> {
 }
 
 fn write(args: &FixArgs, mesh: &Mesh) -> Result<(), Error> {
-    let path = &args.out.path;
-    match &mesh.elements {
-        Elements::Triangles(faces) if args.out.format == MendedFormat::Obj => {
-            write_obj(path, &mesh.positions, faces)?;
-        }
-        Elements::Triangles(faces) if args.out.format == MendedFormat::Stl => {
-            write_stl(path, &mesh.positions, faces)?;
-        }
-        elements => {
-            let body = ColoredMesh {
-                positions: &mesh.positions,
-                elements,
-                element_colors: None,
-                colliding: None,
-                name: "mended",
-            };
-            write_ply(path, &[body])?;
-        }
-    }
-    Ok(())
+    // What is mended has triangles alone.
+    let Elements::Triangles(faces) = &mesh.elements else {
+        return Ok(());
+    };
+    let write = match args.out.format {
+        MendedFormat::Obj => write_obj,
+        MendedFormat::Stl => write_stl,
+        MendedFormat::Ply => write_plain_ply,
+    };
+    Ok(write(&args.out.path, &mesh.positions, faces)?)
 }
 
 fn row(path: &Path, is_welded: bool, counts: Counts, places: &[Place]) -> Row {

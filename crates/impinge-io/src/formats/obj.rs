@@ -6,7 +6,7 @@
 //! have groups of one material each. Faces before the first of these are a body, too. A face may
 //! name vertices that come later (positive indices); negative ones count back from the last vertex
 //! so far. Faces of one or two corners, which some programs write for points and segments, are
-//! counted and skipped.
+//! counted and skipped. So are lines whose first word is not known.
 
 use std::borrow::Cow;
 
@@ -59,6 +59,8 @@ fn statements<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> 
                 }
                 positions.push(finite(name, place, positions.len(), position)?);
             }
+            // Many files have one for every `v`.
+            Some(b"vn" | b"vt") => {}
             Some(b"f") => {
                 parts.corners.clear();
                 for word in words {
@@ -113,6 +115,7 @@ fn statements<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> 
                     format!("free-form geometry ('{word}'; only polygons are read)"),
                 ));
             }
+            Some(word) if !SKIPPED.contains(&word) => parts.unknown(statement),
             _ => {}
         }
     }
@@ -130,6 +133,37 @@ fn statements<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> 
 /// Words that begin the lines of a file; one without any of them is none.
 const STATEMENTS: [&[u8]; 12] = [
     b"v", b"vn", b"vt", b"f", b"o", b"g", b"l", b"p", b"s", b"mtllib", b"usemtl", b"vp",
+];
+
+/// Words of the format that say nothing of polygons and their names.
+const SKIPPED: [&[u8]; 26] = [
+    b"s",
+    b"mg",
+    b"usemtl",
+    b"mtllib",
+    b"usemap",
+    b"maplib",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"lod",
+    b"shadow_obj",
+    b"trace_obj",
+    b"ctech",
+    b"stech",
+    // Of free-form geometry, which its other words refuse.
+    b"cstype",
+    b"deg",
+    b"bmat",
+    b"step",
+    b"parm",
+    b"trim",
+    b"hole",
+    b"scrv",
+    b"sp",
+    b"end",
+    b"con",
+    b"res",
 ];
 
 /// The vertex index of a corner: `7`, `7/1`, `7//3` or `7/1/3`.

@@ -106,7 +106,7 @@ fn read_binary(
     match (element.kind, element.stride()) {
         (Kind::Vertices, Some(stride)) => {
             let start = cursor.offset();
-            let records = cursor.take(element.count, stride, "the vertices")?;
+            let records = fixed_records(parts.name, element, stride, cursor)?;
             let place = |vertex| Place::Byte((start + vertex * stride) as u64);
             parts.positions = vertices(
                 parts.name,
@@ -125,7 +125,7 @@ fn read_binary(
             ));
         }
         (kind, Some(stride)) => {
-            cursor.take(element.count, stride, "the records of an element")?;
+            fixed_records(parts.name, element, stride, cursor)?;
             parts.n_lines += if kind == Kind::Edges {
                 element.count
             } else {
@@ -141,8 +141,11 @@ fn read_binary(
         (cursor.left() / element.least_size()) as u64 + 1,
     );
     let mut indices = Vec::new();
-    for _ in 0..element.count {
+    for n_read in 0..element.count {
         let place = cursor.place();
+        if cursor.left() < element.least_size() {
+            return Err(fewer(parts.name, element, n_read, place));
+        }
         for (ix, property) in element.properties.iter().enumerate() {
             match *property {
                 Property::Scalar { scalar, .. } => {
@@ -168,6 +171,26 @@ fn read_binary(
         parts.n_lines += u64::from(element.kind == Kind::Edges);
     }
     Ok(())
+}
+
+/// The binary records of an element, all of one size.
+fn fixed_records<'b>(
+    name: Name,
+    element: &Element,
+    stride: usize,
+    cursor: &mut Cursor<'b>,
+) -> Result<&'b [u8], Error> {
+    let n_left = (cursor.left() / stride) as u64;
+    if n_left < element.count {
+        return Err(fewer(name, element, n_left, cursor.place()));
+    }
+    cursor.take(element.count, stride, "the records of an element")
+}
+
+/// The error about an element with fewer records than announced.
+fn fewer(name: Name, element: &Element, n_read: u64, place: Place) -> Error {
+    let what = format!("records of the element '{}'", element.name);
+    name.count(place, what, element.count, n_read)
 }
 
 /// The positions in binary records; `xyz` are the offsets and types of the coordinates.
@@ -284,14 +307,8 @@ fn record<'t>(
     text: &mut Text<'t>,
 ) -> Result<Line<'t>, Error> {
     // A line can't contain '\n', so no part of it is taken for a comment.
-    text.content_line(b'\n').ok_or_else(|| {
-        name.count(
-            text.place(),
-            format!("records of the element '{}'", element.name),
-            element.count,
-            n_read,
-        )
-    })
+    let line = text.content_line(b'\n');
+    line.ok_or_else(|| fewer(name, element, n_read, text.place()))
 }
 
 /// The words of one record.

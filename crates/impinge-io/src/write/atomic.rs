@@ -183,19 +183,26 @@ impl Write for AtomicFile {
     }
 }
 
+/// The most bytes of a file's name that its temporary file has in its own.
+const MOST_OF_NAME: usize = 64;
+
 /// Creates a new file in the folder of `target`.
 fn create_beside(target: &Path) -> io::Result<(PathBuf, File)> {
     static SERIAL: AtomicU32 = AtomicU32::new(0);
     let name = target
         .file_name()
-        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "no file name"))?;
+        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "no file name"))?
+        .to_string_lossy();
+    // A name may be as long as the file system allows; that of the temporary file stays below.
+    let mut end = name.len().min(MOST_OF_NAME);
+    while !name.is_char_boundary(end) {
+        end -= 1;
+    }
+    let name = &name[..end];
     loop {
         let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
-        let written = target.with_file_name(format!(
-            ".{}.{}-{serial}.part",
-            name.to_string_lossy(),
-            std::process::id()
-        ));
+        let written =
+            target.with_file_name(format!(".{name}.{}-{serial}.part", std::process::id()));
         let mut parts = parts();
         match OpenOptions::new()
             .write(true)

@@ -14,7 +14,7 @@ pub use atomic::{AtomicFile, remove_temporary_files};
 pub use glb::write_glb;
 pub use obj::write_obj;
 pub use pc2::Pc2Writer;
-pub use ply::write_ply;
+pub use ply::{write_plain_ply, write_ply};
 pub use polylines::{Polylines, write_polylines_obj, write_polylines_ply, write_polylines_vtu};
 pub use stl::write_stl;
 pub use vtu::write_vtu;

@@ -126,6 +126,28 @@ fn obj_faces_of_one_or_two_corners_are_counted_and_skipped() {
     );
 }
 
+#[test]
+fn obj_lines_whose_first_word_is_not_known_are_said() {
+    let notes = |lines: &str| {
+        let obj = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n{lines}");
+        let options = ReadOptions::as_they_are();
+        let (mesh, summary) =
+            read_bytes_with_summary(obj.as_bytes(), Format::Obj, "file", &options).or_show();
+        assert_eq!(triangles(&mesh), [[0, 1, 2]]);
+        summary.notes()
+    };
+    let said =
+        "lines skipped, whose first word is not known: 3, the first of them line 6, 'F 1 2 3'";
+    assert_eq!(
+        notes("# comment\nF 1 2 3\nfoo 1 \\\n2\n\ngarbage line here\n"),
+        [said]
+    );
+    let known = "vn 0 0 1\nvt 0 0\ng a\no b\ns off\nmg 1 2\nusemtl m\nmtllib m.mtl\nusemap off\nmaplib x\nbevel on\n\
+        c_interp off\nd_interp off\nlod 1\nshadow_obj x\ntrace_obj x\nctech cparm 1\nstech curv 1\ncstype bezier\ndeg 3\n\
+        bmat u 1\nstep 1\nparm u 0 1\ntrim 0 1 1\nhole 0 1 1\nscrv 0 1 1\nsp 1\nend\ncon 1 1 1 1\nres 1 1\np 1\n\t\n#\n";
+    assert_eq!(notes(known), [""; 0]);
+}
+
 /// A binary OFF file: numbers of 32 bits, the most significant byte first.
 fn binary_off(keyword: &str, vertices: &[&[f32]], faces: &[(&[i32], &[f32])]) -> Vec<u8> {
     let mut bytes = format!("{keyword} BINARY\n").into_bytes();
@@ -376,6 +398,33 @@ fn ply_errors() {
     ] {
         assert_eq!(message(Format::Ply, &ply), expected);
     }
+    let binary = |n_bytes: usize| {
+        let header = faces
+            .replace("ascii", "binary_little_endian")
+            .replace("face 1", "face 5")
+            .replace("vertex 1", "vertex 2");
+        let header = header.split_inclusive("end_header\n").next().unwrap();
+        let data = [
+            &[0; 24][..],
+            &[3, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0].repeat(5),
+        ]
+        .concat();
+        let bytes = [header.as_bytes(), &data[..n_bytes]].concat();
+        let read = read_bytes(&bytes, Format::Ply, "file", &ReadOptions::default());
+        let text = read.unwrap_err().to_string();
+        text.split_once("expected ")
+            .unwrap_or(("", &text))
+            .1
+            .to_owned()
+    };
+    assert_eq!(binary(23), "2 records of the element 'vertex', found 1");
+    assert_eq!(binary(24), "5 records of the element 'face', found 0");
+    assert_eq!(
+        binary(24 + 3 * 13),
+        "5 records of the element 'face', found 3"
+    );
+    // In the midst of one.
+    assert!(binary(24 + 3 * 13 + 5).ends_with("a list: 12 bytes are needed, but 4 are left"));
 }
 
 #[test]
