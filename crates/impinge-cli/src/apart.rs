@@ -1,7 +1,8 @@
 //! Refuses outputs that are also inputs, or other outputs.
 
 use std::cell::RefCell;
-use std::path::{Path, PathBuf};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf, is_separator};
 
 use impinge_io::printable;
 
@@ -41,9 +42,10 @@ impl Inputs {
         Ok(())
     }
 
-    /// Fails if an output is one of the inputs, under any name or link. Outputs contain less than a
+    /// Fails if an output cannot be a file there, or is one of the inputs, under any name or link. Outputs contain less than a
     /// mesh file may contain (normals, colours, attributes, groups), and the input would be lost.
     pub fn check_frame(&self, option: &str, output: &Path) -> Result<(), Error> {
+        check_folder(output)?;
         let Some(output_id) = Id::of(output) else {
             return Ok(());
         };
@@ -56,6 +58,26 @@ impl Inputs {
             ))),
         }
     }
+}
+
+/// Fails if an output is a folder, or its folder is missing: before the work, not after it.
+fn check_folder(output: &Path) -> Result<(), Error> {
+    let refuse = |kind, text: String| Error::Write {
+        path: output.to_owned(),
+        source: io::Error::new(kind, text),
+    };
+    let bytes = output.as_os_str().as_encoded_bytes();
+    let ends_as_folder = bytes.last().is_some_and(|&byte| is_separator(byte.into()));
+    if ends_as_folder || output.is_dir() {
+        let text = "this is the name of a folder, not of a file".to_owned();
+        return Err(refuse(ErrorKind::IsADirectory, text));
+    }
+    let folder = output.parent().unwrap_or(Path::new(""));
+    if !folder.as_os_str().is_empty() && !folder.exists() {
+        let text = format!("there is no folder {}", printable(folder));
+        return Err(refuse(ErrorKind::NotFound, text));
+    }
+    Ok(())
 }
 
 /// The file that a name leads to, whether it exists or not.

@@ -304,3 +304,44 @@ fn nothing_is_written_where_no_face_is_left() {
         "as it was"
     );
 }
+
+#[test]
+fn a_mended_ply_has_positions_and_triangles_alone() {
+    let folder = Folder::new();
+    folder.text("good.obj", CLOSED);
+    folder
+        .run(["fix", "good.obj", "--out", "good.ply"])
+        .printed();
+    let bytes = std::fs::read(folder.path("good.ply")).unwrap();
+    let text = String::from_utf8_lossy(&bytes);
+    let header = text.split("end_header").next().unwrap();
+    assert_eq!(
+        header,
+        "ply\nformat binary_little_endian 1.0\ncomment written by impinge\nelement vertex 4\nproperty double x\n\
+         property double y\nproperty double z\nelement face 4\nproperty list uchar int vertex_indices\n"
+    );
+}
+
+#[test]
+fn an_output_that_can_be_no_file_is_refused_before_the_work() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("folder.obj")).unwrap();
+    for (out, said) in [
+        ("no/x.obj", "no/x.obj: cannot write: there is no folder no"),
+        (
+            "new.obj/",
+            "new.obj/: cannot write: this is the name of a folder, not of a file",
+        ),
+        (
+            "folder.obj",
+            "folder.obj: cannot write: this is the name of a folder, not of a file",
+        ),
+    ] {
+        // The mesh is not even looked for.
+        let args = ["fix", "missing.obj", "--out", out, "--force"];
+        assert_eq!(folder.run(args).error(), said);
+        let args = ["fix", "missing.obj", "--out", "x.obj", "--rows", out];
+        let args = args.into_iter().chain(["--rows-format", "csv"]);
+        assert_eq!(folder.run(args).error(), said);
+    }
+}
