@@ -18,6 +18,7 @@ use impinge::CancelToken;
 
 use self::child::{Answer, Child};
 use crate::row::{ErrorKind, Row};
+use crate::worker::question;
 
 /// Checks meshes in child processes, several at a time.
 pub struct Pool<'a> {
@@ -114,11 +115,10 @@ impl Pool<'_> {
         held: &mut Option<Child>,
         cancel: &CancelToken,
     ) -> Result<Row, PoolError> {
-        let failed = |kind, message: &str| {
-            Row::failed(&path.display().to_string(), self.weld, kind, message)
-        };
-        let Some(name) = path.to_str() else {
-            return Ok(failed(ErrorKind::File, "the path is not UTF-8"));
+        let name = path.display().to_string();
+        let failed = |kind, message: &str| Row::failed(&name, self.weld, kind, message);
+        let Some(question) = question(path) else {
+            return Ok(failed(ErrorKind::File, "the path is not Unicode"));
         };
         loop {
             let (mut child, is_fresh) = match held.take() {
@@ -128,7 +128,7 @@ impl Pool<'_> {
                     true,
                 ),
             };
-            match child.ask(name, self.timeout, cancel) {
+            match child.ask(&question, &name, self.timeout, cancel) {
                 Answer::Row(row) => {
                     // A child that has worked before may have less memory left than a fresh one.
                     let is_short = matches!(&row.result, Err(why) if why.kind.may_pass());

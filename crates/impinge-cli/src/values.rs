@@ -7,6 +7,40 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::ValueEnum;
+use clap::builder::{OsStringValueParser, TypedValueParser, ValueParser, ValueParserFactory};
+
+/// A value that is made of a path, which need not be UTF-8.
+pub trait OfPath: Sized {
+    fn of_path(path: &Path) -> Result<Self, String>;
+}
+
+/// How options take such a value.
+pub fn of_path<T: OfPath + Clone + Send + Sync + 'static>() -> ValueParser {
+    ValueParser::new(OsStringValueParser::new().try_map(|path| T::of_path(path.as_ref())))
+}
+
+/// Options of these types take paths.
+macro_rules! of_paths {
+    ($($file:ty),*) => {
+        $(impl ValueParserFactory for $file {
+            type Parser = ValueParser;
+
+            fn value_parser() -> ValueParser {
+                of_path::<Self>()
+            }
+        })*
+    };
+}
+
+of_paths!(
+    RowsFile,
+    CurvesFile,
+    MeshFile,
+    ReachedFile,
+    MendedFile,
+    PngFile,
+    HtmlFile
+);
 
 /// A file for rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,7 +68,7 @@ impl RowsFile {
     pub fn new(path: &Path, format: Option<RowsFormat>) -> Result<Self, String> {
         let format = match format {
             Some(format) => format,
-            None => match extension(&path.to_string_lossy()).as_str() {
+            None => match extension(path).as_str() {
                 "npy" => RowsFormat::Npy,
                 "csv" => RowsFormat::Csv,
                 "jsonl" | "ndjson" => RowsFormat::Jsonl,
@@ -58,11 +92,9 @@ impl RowsFile {
     }
 }
 
-impl FromStr for RowsFile {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        RowsFile::new(Path::new(text), None)
+impl OfPath for RowsFile {
+    fn of_path(path: &Path) -> Result<Self, String> {
+        RowsFile::new(path, None)
     }
 }
 
@@ -81,18 +113,16 @@ pub enum CurvesFormat {
     Vtu,
 }
 
-impl FromStr for CurvesFile {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let format = match extension(text).as_str() {
+impl OfPath for CurvesFile {
+    fn of_path(path: &Path) -> Result<Self, String> {
+        let format = match extension(path).as_str() {
             "ply" => CurvesFormat::Ply,
             "obj" => CurvesFormat::Obj,
             "vtu" => CurvesFormat::Vtu,
             _ => return Err("curves are written as .ply, .obj or .vtu".to_owned()),
         };
         Ok(CurvesFile {
-            path: text.into(),
+            path: path.to_owned(),
             format,
         })
     }
@@ -113,18 +143,16 @@ pub enum MeshFormat {
     Vtu,
 }
 
-impl FromStr for MeshFile {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let format = match extension(text).as_str() {
+impl OfPath for MeshFile {
+    fn of_path(path: &Path) -> Result<Self, String> {
+        let format = match extension(path).as_str() {
             "ply" => MeshFormat::Ply,
             "glb" => MeshFormat::Glb,
             "vtu" => MeshFormat::Vtu,
             _ => return Err("meshes are written as .ply, .glb or .vtu".to_owned()),
         };
         Ok(MeshFile {
-            path: text.into(),
+            path: path.to_owned(),
             format,
         })
     }
@@ -137,16 +165,14 @@ pub struct ReachedFile {
     pub is_obj: bool,
 }
 
-impl FromStr for ReachedFile {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let is_obj = match extension(text).as_str() {
+impl OfPath for ReachedFile {
+    fn of_path(path: &Path) -> Result<Self, String> {
+        let is_obj = match extension(path).as_str() {
             "obj" => true,
             "ply" => false,
             _ => return Err("bodies are written as .ply or .obj".to_owned()),
         };
-        let path = text.into();
+        let path = path.to_owned();
         Ok(ReachedFile { path, is_obj })
     }
 }
@@ -166,17 +192,15 @@ pub enum MendedFormat {
     Stl,
 }
 
-impl FromStr for MendedFile {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let format = match extension(text).as_str() {
+impl OfPath for MendedFile {
+    fn of_path(path: &Path) -> Result<Self, String> {
+        let format = match extension(path).as_str() {
             "ply" => MendedFormat::Ply,
             "obj" => MendedFormat::Obj,
             "stl" => MendedFormat::Stl,
             _ => return Err("mended meshes are written as .ply, .obj or .stl".to_owned()),
         };
-        let path = text.into();
+        let path = path.to_owned();
         Ok(MendedFile { path, format })
     }
 }
@@ -191,15 +215,15 @@ pub struct FramesFile<T> {
     made_of: PhantomData<T>,
 }
 
-impl<T: FromStr<Err = String>> FramesFile<T> {
+impl<T: OfPath> FramesFile<T> {
     /// The file of a frame.
     pub fn frame(&self, frame_ix: usize) -> Result<T, String> {
         let (before, width, after) = (&self.before, self.width, &self.after);
-        format!("{before}{frame_ix:0width$}{after}").parse()
+        T::of_path(format!("{before}{frame_ix:0width$}{after}").as_ref())
     }
 }
 
-impl<T: FromStr<Err = String>> FromStr for FramesFile<T> {
+impl<T: OfPath> FromStr for FramesFile<T> {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -256,8 +280,8 @@ pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
         .ok_or_else(|| "expected a whole number of at least 1 and at most 1024".to_owned())
 }
 
-fn extension(path: &str) -> String {
-    let extension = Path::new(path).extension().unwrap_or_default();
+fn extension(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
     extension.to_string_lossy().to_ascii_lowercase()
 }
 
@@ -299,12 +323,10 @@ impl FromStr for FrameRange {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PngFile(pub PathBuf);
 
-impl FromStr for PngFile {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match extension(text).as_str() {
-            "png" => Ok(PngFile(text.into())),
+impl OfPath for PngFile {
+    fn of_path(path: &Path) -> Result<Self, String> {
+        match extension(path).as_str() {
+            "png" => Ok(PngFile(path.to_owned())),
             _ => Err("pictures are written as .png".to_owned()),
         }
     }
@@ -314,12 +336,10 @@ impl FromStr for PngFile {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HtmlFile(pub PathBuf);
 
-impl FromStr for HtmlFile {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match extension(text).as_str() {
-            "html" | "htm" => Ok(HtmlFile(text.into())),
+impl OfPath for HtmlFile {
+    fn of_path(path: &Path) -> Result<Self, String> {
+        match extension(path).as_str() {
+            "html" | "htm" => Ok(HtmlFile(path.to_owned())),
             _ => Err("reports are written as .html".to_owned()),
         }
     }
@@ -607,24 +627,33 @@ mod tests {
 
     #[test]
     fn files_by_extension() {
-        assert_eq!("a.NPY".parse::<RowsFile>().unwrap().format, RowsFormat::Npy);
-        assert_eq!("a.csv".parse::<RowsFile>().unwrap().format, RowsFormat::Csv);
         assert_eq!(
-            "a.jsonl".parse::<RowsFile>().unwrap().format,
+            RowsFile::of_path("a.NPY".as_ref()).unwrap().format,
+            RowsFormat::Npy
+        );
+        assert_eq!(
+            RowsFile::of_path("a.csv".as_ref()).unwrap().format,
+            RowsFormat::Csv
+        );
+        assert_eq!(
+            RowsFile::of_path("a.jsonl".as_ref()).unwrap().format,
             RowsFormat::Jsonl
         );
-        assert!("-".parse::<RowsFile>().unwrap().is_stdout());
-        assert!("a.txt".parse::<RowsFile>().is_err());
+        assert!(RowsFile::of_path("-".as_ref()).unwrap().is_stdout());
+        assert!(RowsFile::of_path("a.txt".as_ref()).is_err());
         let frames: FramesFile<MeshFile> = "f_%03d.glb".parse().unwrap();
-        assert_eq!(frames.frame(7).unwrap(), "f_007.glb".parse().unwrap());
+        assert_eq!(
+            frames.frame(7).unwrap(),
+            MeshFile::of_path("f_007.glb".as_ref()).unwrap()
+        );
         for text in ["f.glb", "f_%03d.txt", "f_%s.glb", "f_%99999d.glb"] {
             assert!(text.parse::<FramesFile<MeshFile>>().is_err(), "{text}");
         }
         assert_eq!(
-            "a.b.vtu".parse::<MeshFile>().unwrap().format,
+            MeshFile::of_path("a.b.vtu".as_ref()).unwrap().format,
             MeshFormat::Vtu
         );
-        assert!("ply".parse::<MeshFile>().is_err());
+        assert!(MeshFile::of_path("ply".as_ref()).is_err());
     }
 
     #[test]
@@ -640,8 +669,11 @@ mod tests {
         assert!(elevation("90.5").is_err() && elevation("nan").is_err());
         assert_eq!((part("0"), part("1")), (Ok(0.0), Ok(1.0)));
         assert!(part("-0.1").is_err() && part("1.1").is_err());
-        assert_eq!("a.PNG".parse(), Ok(PngFile("a.PNG".into())));
-        assert!("a.jpg".parse::<PngFile>().is_err());
+        assert_eq!(
+            PngFile::of_path("a.PNG".as_ref()),
+            Ok(PngFile("a.PNG".into()))
+        );
+        assert!(PngFile::of_path("a.jpg".as_ref()).is_err());
     }
 
     #[test]

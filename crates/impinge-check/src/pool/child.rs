@@ -70,10 +70,17 @@ impl Child {
         })
     }
 
-    /// Asks for the row of one mesh. After any other answer than a row, drop the child.
-    pub fn ask(&mut self, path: &str, timeout: Option<Duration>, cancel: &CancelToken) -> Answer {
+    /// Asks for the row of one mesh, which has this path. After any other answer than a row, drop
+    /// the child.
+    pub fn ask(
+        &mut self,
+        question: &Value,
+        path: &str,
+        timeout: Option<Duration>,
+        cancel: &CancelToken,
+    ) -> Answer {
         let started = Instant::now();
-        let question = format!("{}\n", Value::from(path));
+        let question = format!("{question}\n");
         let asked = self.input.as_mut().map(|input| {
             input.write_all(question.as_bytes())?;
             input.flush()

@@ -9,7 +9,7 @@ mod rows;
 mod shown;
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, ErrorKind, Write, stdin, stdout};
+use std::io::{self, BufRead, ErrorKind, Write, stdin, stdout};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -27,6 +27,7 @@ use crate::error::Error;
 use crate::load::{STDIN, tell};
 use crate::output;
 use crate::stop::Patience;
+use crate::text::grouped;
 use crate::watch::Watch;
 
 /// `impinge check`.
@@ -183,12 +184,14 @@ fn paths(args: &CheckArgs) -> Result<Vec<PathBuf>, Error> {
             let file = std::fs::File::open(list).map_err(read)?;
             Box::new(std::io::BufReader::new(file))
         };
-        for line in lines.lines() {
+        for (ix, line) in lines.split(b'\n').enumerate() {
             let line = line.map_err(read)?;
-            let line = line.strip_suffix('\r').unwrap_or(&line);
-            let is_comment = line.trim_start().starts_with('#');
-            if !is_comment && !line.trim().is_empty() {
-                paths.push(line.into());
+            // Some editors put a byte order mark before UTF-8.
+            let mark: &[u8] = if ix == 0 { b"\xef\xbb\xbf" } else { b"" };
+            let line = line.strip_prefix(mark).unwrap_or(&line);
+            let line = line.strip_suffix(b"\r").unwrap_or(line);
+            if !matches!(line.trim_ascii_start(), [] | [b'#', ..]) {
+                paths.push(path_of(line).map_err(read)?);
             }
         }
     }
@@ -199,6 +202,21 @@ fn paths(args: &CheckArgs) -> Result<Vec<PathBuf>, Error> {
         )));
     }
     Ok(paths)
+}
+
+/// A path of a list, of any bytes where the system has such names.
+#[cfg(unix)]
+fn path_of(line: &[u8]) -> io::Result<PathBuf> {
+    use std::os::unix::ffi::OsStrExt;
+    Ok(std::ffi::OsStr::from_bytes(line).into())
+}
+
+/// A path of a list.
+#[cfg(not(unix))]
+fn path_of(line: &[u8]) -> io::Result<PathBuf> {
+    let text = std::str::from_utf8(line);
+    let text = text.map_err(|error| io::Error::new(ErrorKind::InvalidData, error))?;
+    Ok(text.into())
 }
 
 /// The numbers of this process's meshes: whole batches, dealt to processes in turn.
@@ -271,7 +289,8 @@ fn run(
                 }
             }
         });
-        let ran = pool.run(&chosen, &stop, |ix, row| {
+        let ran = pool.run(&chosen, &stop, |ix, mut row| {
+            say_limit(args, &mut row);
             if result.is_ok() {
                 result = put(wanted[ix], row);
                 if result.is_err() {
@@ -286,6 +305,19 @@ fn run(
     match ran {
         Err(PoolError::Cancelled) => Err(impinge::Error::Cancelled.into()),
         other => Ok(other?),
+    }
+}
+
+/// Says of a mesh for which there was no memory under `--memory` what to do. What the child said is
+/// of no use.
+fn say_limit(args: &CheckArgs, row: &mut Row) {
+    if let (Some(memory), Err(failure)) = (args.memory, &mut row.result)
+        && failure.kind == impinge_check::ErrorKind::Memory
+    {
+        failure.message = format!(
+            "it needs more memory than --memory allows, {} bytes: give more, or leave the limit out",
+            grouped(memory)
+        );
     }
 }
 

@@ -168,6 +168,10 @@ fn a_list_may_have_comments() {
         .map(|row| row["path"].as_str().unwrap())
         .collect();
     assert_eq!(paths, ["closed.obj", "open.obj"]);
+    // A byte order mark is no part of the first name.
+    folder.text("list.txt", "\u{feff}closed.obj\n");
+    let marked = self::rows(folder.run(["check", "--json", "--list", "list.txt"]));
+    assert_eq!(marked[0], rows[0]);
 }
 
 #[test]
@@ -298,7 +302,43 @@ fn a_mesh_that_is_too_large_is_a_row() {
     ];
     let rows = parsed(&failed(folder.run(args), 1, 2));
     assert_eq!(rows[0]["error_kind"], "memory", "{}", rows[0]);
+    assert_eq!(
+        rows[0]["error"],
+        "it needs more memory than --memory allows, 2,147,483,648 bytes: give more, or leave the limit out"
+    );
     assert_eq!(rows[1]["error"], Value::Null);
+    let none = folder
+        .run(["check", "closed.obj", "--memory", "0"])
+        .misuse();
+    assert!(none.contains("above 0, such as 4G"), "{none}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn names_of_files_need_not_be_utf8() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = meshes();
+    let name = |end: &str| [&b"part\xff"[..], end.as_bytes()].concat();
+    let path = |end| folder.path("").join(OsStr::from_bytes(&name(end)));
+    std::fs::copy(folder.path("closed.obj"), path(".obj")).unwrap();
+    let list = [&name(".obj")[..], b"\nclosed.obj\n"].concat();
+    std::fs::write(folder.path("list.txt"), list).unwrap();
+    let rows = rows(folder.run(["check", "--json", "--list", "list.txt"]));
+    assert_eq!(rows[0]["path"], "part\u{fffd}.obj");
+    assert_eq!(rows[0]["hash"], rows[1]["hash"]);
+    for (command, option, end) in [
+        ("check", "--html", ".html"),
+        ("check", "--rows", ".csv"),
+        ("fix", "--out", ".ply"),
+        ("self", "--out", ".glb"),
+        ("self", "--png", ".png"),
+    ] {
+        let (mesh, out) = (name(".obj"), name(end));
+        let args = [command.as_bytes(), &mesh, option.as_bytes(), &out];
+        folder.run(args.map(OsStr::from_bytes)).printed();
+        assert!(path(end).exists(), "{command} {option}");
+    }
 }
 
 #[cfg(target_os = "linux")]

@@ -3,15 +3,16 @@
 use std::ffi::OsStr;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
-use clap::builder::{EnumValueParser, PossibleValue, TypedValueParser};
+use clap::builder::{
+    EnumValueParser, PossibleValue, TypedValueParser, ValueParser, ValueParserFactory,
+};
 use clap::error::ErrorKind;
 use clap::{Arg, Args, Command, ValueEnum};
 use impinge_check::Finding;
 
 use crate::args::PictureArgs;
-use crate::values::{HtmlFile, MeshFile, PngFile, RowsFile, bytes, mesh_format};
+use crate::values::{HtmlFile, MeshFile, OfPath, PngFile, RowsFile, bytes, mesh_format, of_path};
 
 /// Shown below the help.
 pub const CHECK_EXAMPLES: &str = "\
@@ -97,7 +98,7 @@ pub struct CheckArgs {
     #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Many meshes")]
     pub timeout: Option<f64>,
     /// Address space of each child process, such as 4G (Unix) [default: no limit]
-    #[arg(long, value_name = "BYTES", value_parser = bytes, help_heading = "Many meshes")]
+    #[arg(long, value_name = "BYTES", value_parser = memory, help_heading = "Many meshes")]
     pub memory: Option<u64>,
     /// Child processes at a time [default: one per core]
     #[arg(long, value_name = "N", help_heading = "Many meshes")]
@@ -202,18 +203,23 @@ pub enum Out {
     Mesh(MeshFile),
 }
 
-impl FromStr for Out {
-    type Err = String;
+impl ValueParserFactory for Out {
+    type Parser = ValueParser;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        if let Ok(file) = text.parse::<MeshFile>() {
+    fn value_parser() -> ValueParser {
+        of_path::<Self>()
+    }
+}
+
+impl OfPath for Out {
+    fn of_path(path: &Path) -> Result<Self, String> {
+        if let Ok(file) = MeshFile::of_path(path) {
             return Ok(Out::Mesh(file));
         }
-        let path = PathBuf::from(text);
         if path.is_file() {
             return Err("expected a folder, or a mesh file (.glb, .ply, .vtu)".to_owned());
         }
-        Ok(Out::Folder(path))
+        Ok(Out::Folder(path.to_owned()))
     }
 }
 
@@ -354,6 +360,13 @@ fn length(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("expected a length above 0".to_owned()),
+    }
+}
+
+fn memory(text: &str) -> Result<u64, String> {
+    match bytes(text)? {
+        0 => Err("expected a number of bytes above 0, such as 4G".to_owned()),
+        memory => Ok(memory),
     }
 }
 
