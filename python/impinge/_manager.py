@@ -339,7 +339,7 @@ class CollisionManager:
         Returns
         -------
         float
-            Less than 0 where objects overlap and it is known by how much.
+            Less than 0 where objects overlap and it is known by how much: of those that overlap the most.
         (name, name)
             Sorted. With `return_names`.
         DistanceData
@@ -367,7 +367,7 @@ class CollisionManager:
         Returns
         -------
         float
-            Less than 0 where they overlap and it is known by how much.
+            Less than 0 where they overlap and it is known by how much: of those that overlap the most.
         name
             Of the nearest object. With `return_name`.
         DistanceData
@@ -393,7 +393,7 @@ class CollisionManager:
         Returns
         -------
         float
-            Less than 0 where they overlap and it is known by how much.
+            Less than 0 where they overlap and it is known by how much: of those that overlap the most.
         (name, name)
             Of this manager and of the other. With `return_names`.
         DistanceData
@@ -511,7 +511,7 @@ class _Asked:
         return_names: bool,
         return_data: bool,
     ) -> Any:
-        asked = {"which": "between"} if across is None else {"_across": [across]}
+        asked = _asked(across)
         if not (return_names or return_data):
             return self.detector._any(self.scene, asked)
         pairs = Pairs(self.detector._detect(self.scene, asked))
@@ -576,22 +576,35 @@ class _Asked:
         if nearest is None:
             parts: list[Any] = [float("inf"), None, None]
         else:
-            a, b = int(nearest.body_a), int(nearest.body_b)
-            distance = nearest.distance
-            ends: Any = None
-            if distance == 0:
-                distance, ends = self._depth(a, b)
-            if ends is None:
-                ends = tuple(nearest.points)
-            first, second, swapped = self._sides(a, b, across)
-            i, j = nearest.element_a, nearest.element_b
+            found = _Found(
+                nearest.distance,
+                (int(nearest.body_a), int(nearest.body_b)),
+                (nearest.element_a, nearest.element_b),
+                tuple(nearest.points),
+            )
+            if found.distance == 0:
+                found = self._deepest(found, across)
+            first, second, swapped = self._sides(*found.bodies, across)
+            elements, ends = found.elements, found.ends
             if swapped:
-                i, j = j, i
-                ends = (ends[1], ends[0])
-            data = DistanceData((first, second), (i, j), distance, ends)
-            parts = [distance, name(first, second), data]
+                elements, ends = elements[::-1], ends[::-1]
+            data = DistanceData((first, second), elements, found.distance, ends)
+            parts = [found.distance, name(first, second), data]
         wanted = [True, return_names, return_data]
         return _answer([part for part, is_wanted in zip(parts, wanted) if is_wanted])
+
+    def _deepest(self, touching: _Found, across: Body | None) -> _Found:
+        """Of all pairs of bodies that share a point the one that overlaps the most. `touching` is one of them: the answer, where
+        no depth is known."""
+        rows = Pairs(self.detector._detect(self.scene, _asked(across))).rows
+        both, first = np.unique(rows[:, [0, 2]], axis=0, return_index=True)
+        deepest = touching
+        for (a, b), row in zip(both.tolist(), first.tolist()):
+            distance, ends = self._depth(a, b)
+            if distance < deepest.distance:
+                elements = int(rows[row, 1]), int(rows[row, 3])
+                deepest = _Found(distance, (a, b), elements, ends)
+        return deepest
 
     def _depth(self, a: int, b: int) -> tuple[float, Any]:
         """The distance of two bodies that share a point, less than 0 where they overlap, and the deepest points."""
@@ -632,6 +645,20 @@ class _Asked:
             )
             self._convex[number] = known
         return known
+
+
+class _Found(NamedTuple):
+    """Two bodies, how far they are apart, which of their elements, and where."""
+
+    distance: float
+    bodies: tuple[int, int]
+    elements: tuple[int, int]
+    ends: Any
+
+
+def _asked(across: Body | None) -> dict[str, Any]:
+    """Asks for all pairs of bodies, or for those of one."""
+    return {"which": "between"} if across is None else {"_across": [across]}
 
 
 #: The objects of the other manager come after all others.

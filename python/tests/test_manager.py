@@ -165,8 +165,7 @@ def test_guests_are_kept_and_followed():
         distance, nearest = a.min_distance_other(b, return_names=True)
         expected = others[0].min_distance_other(others[1], return_names=True)
         if collide:
-            # Of several that overlap, it is the depth of one.
-            assert distance <= 0 and expected[0] <= 0 and nearest in names
+            assert distance == pytest.approx(expected[0]) and distance <= 0 and nearest in names
         else:
             assert (distance, nearest) == expected and b.min_distance_other(a) == distance
         n_hits += len(a.in_collision_other(b, return_names=True)[1])
@@ -281,6 +280,38 @@ def test_how_deep_convex_objects_overlap():
     assert made.min_distance_single(cube(), shift(6)) == 0
     [touching] = made.in_collision_single(cube(), shift(6), return_data=True)[1]
     assert touching.depth == 0 and touching.normal.tolist() == [1, 0, 0]
+
+
+@pytest.mark.parametrize("names", ["abc", "acb", "bac", "bca", "cab", "cba"])
+def test_the_smallest_distance_is_that_of_the_deepest_overlap(names):
+    places = {"a": shift(0), "b": shift(0.9), "c": shift(0.9, 0.3)}
+    made, other = impinge.CollisionManager(**SETTINGS), impinge.CollisionManager(**SETTINGS)
+    for name in names:
+        made.add_object(name, cube(), places[name])
+    # Nothing is known of how deep sheets overlap, wherever they come.
+    sheet = np.array([[8.0, 0, 0], [9, 0, 0], [8, 1, 0]]), [[0, 1, 2]]
+    for name in "st":
+        made.add_object(name, sheet)
+    distance, pair, data = made.min_distance_internal(None, True, True)
+    assert distance == pytest.approx(-0.7) and pair == ("b", "c") and data.names == {"b", "c"}
+    gap = data.point("c") - data.point("b")
+    assert np.linalg.norm(gap) == pytest.approx(0.7) and gap[1] == pytest.approx(-0.7)
+    contacts = made.in_collision_internal(return_data=True)[1]
+    assert max(contact.depth for contact in contacts) == -distance == -data.distance
+    found = [contact for contact in contacts if contact.names == {"b", "c"}]
+    assert [found[0].index(name) for name in "bc"] == [data.index(name) for name in "bc"]
+    assert made.min_distance_internal("a") == pytest.approx(-0.1)
+    assert made.min_distance_internal("c", True)[1] == ("b", "c")
+    assert made.min_distance_internal("s") == 0
+    # A guest, and a manager of two.
+    distance, name = made.min_distance_single(cube(), shift(0.5, -0.3), True)
+    assert distance == pytest.approx(-0.6) and name == "b"
+    other.add_object("far", cube(), shift(-0.95))
+    other.add_object("near", cube(), shift(0.5, -0.3))
+    distance, pair, data = made.min_distance_other(other, True, True)
+    assert distance == pytest.approx(-0.6) and pair == ("b", "near") and data.names == set(pair)
+    distance, pair = other.min_distance_other(made, True)
+    assert distance == pytest.approx(-0.6) and pair == ("near", "b")
 
 
 def turned():
