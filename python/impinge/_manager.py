@@ -781,17 +781,22 @@ _FLAT = 1e-6
 
 
 def _is_convex(vertices: _Array, faces: npt.NDArray[np.uint32]) -> bool:
-    """Whether triangles are one closed surface that bends outwards at each edge."""
+    """Whether triangles are one closed surface of all vertices, faces of which turn one way and bend outwards at each edge."""
     n_sides = 3 * len(faces)
     if len(faces) < 4 or n_sides % 2:
         return False
-    sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    ways = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    sides = np.sort(ways, axis=1)
     order = np.lexsort(sides.T)
     sides = sides[order]
     first, second = sides[::2], sides[1::2]
     if (first != second).any() or (first[1:] == first[:-1]).all(1).any():
         return False
-    if len(np.unique(faces)) - n_sides // 2 + len(faces) != 2:
+    # Neighbours that turn the same way run along their edge in opposite ones.
+    ways = ways[order]
+    if (ways[::2] == ways[1::2]).any():
+        return False
+    if len(np.unique(faces)) != len(vertices) or len(vertices) - n_sides // 2 + len(faces) != 2:
         return False
     points = np.asarray(vertices, np.float64)
     corners = points[faces]
@@ -799,7 +804,14 @@ def _is_convex(vertices: _Array, faces: npt.NDArray[np.uint32]) -> bool:
     normals = np.cross(q - p, r - p)
     if np.einsum("ij,ij->", p - points.mean(0), normals) < 0:
         normals = -normals
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+    lengths = np.linalg.norm(normals, axis=1)
+    normals /= np.maximum(lengths, np.finfo(float).tiny)[:, None]
     one, other = order[::2] // 3, order[1::2] // 3
+    flat = _FLAT * np.ptp(points, axis=0).max()
     heights = np.einsum("ijk,ik->ij", corners[other] - p[one][:, None], normals[one])
-    return bool(heights.max() <= _FLAT * np.ptp(points, axis=0).max())
+    if heights.max() > flat:
+        return False
+    # A face without area says nothing of the edge between the faces on its sides: these are compared with all vertices.
+    empty = lengths == 0
+    beside = np.concatenate([one[empty[other]], other[empty[one]]])
+    return all(((points - p[face]) @ normals[face]).max() <= flat for face in np.unique(beside).tolist())

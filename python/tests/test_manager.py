@@ -382,6 +382,66 @@ def test_objects_that_are_not_convex():
     assert all(np.linalg.norm(contact.normal) == pytest.approx(1) for contact in sheets)
 
 
+def dented():
+    """A box of which the top is pushed in, down to a point."""
+    corners = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))] + [[0, 0, -0.5]])
+    faces = [[0, 2, 1], [0, 3, 2]]
+    for i in range(4):
+        j = (i + 1) % 4
+        faces += [[i, j, 4 + j], [i, 4 + j, 4 + i], [4 + i, 4 + j, 8]]
+    return corners, np.array(faces)
+
+
+def test_faces_that_turn_different_ways_make_nothing_convex():
+    corners, faces = dented()
+    turned_round = [row for row, face in enumerate(faces.tolist()) if 8 in face][:3]
+    mixed = faces.copy()
+    mixed[turned_round] = mixed[turned_round, ::-1]
+    box, size = cube(), np.array([0.2, 0.2, 0.6])
+    for surface, expected in [(faces, -0.15), (mixed, 0.0)]:
+        made = impinge.CollisionManager(**SETTINGS)
+        made.add_object("dented", (corners, surface))
+        made.add_object("rod", (box[0] * size, box[1]), shift(0, 0, -0.2))
+        # In the hull it would be 1.1.
+        assert made.min_distance_internal() == pytest.approx(expected)
+        assert made.in_collision_internal()
+
+
+def notched(apart):
+    """A prism over an L. The edge of its notch is cut in two on one side: a face without area closes the gap, unless it is `apart`."""
+    outline = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]
+    corners = [[x, y, z] for z in (0.0, 2.0) for x, y in outline] + [[1 + apart, 1 + apart, 1]]
+    faces = []
+    for a, b, c in [(0, 1, 3), (1, 2, 3), (0, 3, 5), (3, 4, 5)]:
+        faces += [[a, c, b], [6 + a, 6 + b, 6 + c]]
+    for i in range(6):
+        j = (i + 1) % 6
+        faces += [[i, j, 6 + j], [i, 6 + j, 6 + i]] if i != 2 else [[2, 3, 12], [2, 12, 9], [2, 9, 8], [3, 9, 12]]
+    return np.array(corners), np.array(faces)
+
+
+def test_what_is_convex():
+    convex = impinge._manager._is_convex
+    for vertices, faces in [cube(), turned(), ball(8, 12, np.float64)]:
+        vertices, faces = np.asarray(vertices), np.asarray(faces, np.uint32)
+        assert convex(vertices, faces) and convex(vertices, faces[:, ::-1])
+        for row in range(len(faces)):
+            one_turned = faces.copy()
+            one_turned[row] = faces[row, ::-1]
+            assert not convex(vertices, one_turned)
+        # A vertex of no face would be one of the hull.
+        assert not convex(np.concatenate([vertices, [[9, 9, 9]]]), faces)
+        assert not convex(vertices, faces[1:])
+    for made in [dented(), bowl(), notched(0.0), notched(0.1)]:
+        assert not convex(*made)
+    # A cube with an edge that is closed by a face without area.
+    corners, faces = map(np.array, cube())
+    edge, n = faces[0, :2], len(corners)
+    sliver = [[edge[0], n, faces[0, 2]], [n, edge[1], faces[0, 2]], [*edge, n]]
+    cut = np.concatenate([faces[1:], sliver])
+    assert convex(np.concatenate([corners, [corners[edge].mean(0)]]), cut)
+
+
 def test_names_are_sorted_and_need_no_order():
     made = impinge.CollisionManager(**SETTINGS)
     vertices, faces = ball(8, 12, np.float64)
