@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Hashable, Iterator
 from copy import copy
 from functools import cached_property
@@ -120,7 +121,7 @@ class CollisionManager:
     with it. `impinge.contains`, asked about a vertex of the inner object, tells; so does `Detector.penetration`.
 
     Managers copy and pickle with their settings and all objects, and copies are independent of each other: each process, or each
-    thread, may have one.
+    thread, may have one. A forked process may go on with those of its parent.
 
     How deep objects overlap: of two convex ones the shortest way that takes them apart, as FCL has it; of other closed ones how
     far their deepest region of contact extends along its normal.
@@ -463,16 +464,31 @@ def scene_to_collision(scene: Any, **settings: Any) -> tuple[CollisionManager, d
     return manager, objects
 
 
+#: Detectors of the processes that this one was forked from: they are never ended, for that would wait for their threads.
+_OF_PARENTS: list[Detector] = []
+
+
 class _Asked:
     """Named bodies in a scene, and the detector that is asked about them."""
 
     def __init__(self, settings: dict[str, Any]) -> None:
         self.scene = Scene()
-        self.detector = Detector(**settings)
+        self._settings = settings
+        self._detector = Detector(**settings)
+        self._process = os.getpid()
         #: By the numbers of bodies: their names, and which of two comes first.
         self._names: dict[int, _Name] = {}
         self._order: dict[int, int] = {}
         self._convex: dict[int, bool] = {}
+
+    @property
+    def detector(self) -> Detector:
+        """The detector of this process."""
+        if self._process != os.getpid():
+            # Threads and a GPU do not survive a fork.
+            _OF_PARENTS.append(self._detector)
+            self._detector, self._process = Detector(**self._settings), os.getpid()
+        return self._detector
 
     def add(self, name: _Name, mesh: Any, transform: _Array | None, after: int = 0) -> Body:
         """Adds a body that comes after those that are there, and by `after` later."""

@@ -2,7 +2,10 @@
 
 import copy
 import multiprocessing
+import os
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -129,6 +132,46 @@ def test_each_process_has_its_copy():
     balls = manager(0, 1.5, 9)
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         assert pool.apply(in_process, (balls,)) == in_process(balls)
+
+
+FORKED_MANAGERS = """
+import os, sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np, impinge
+from shapes import ball
+vertices, faces = ball(30, 40, np.float64)
+for threads in (1, 2, None):
+    made, other = (impinge.CollisionManager(backend="cpu", threads=threads) for _ in range(2))
+    for name, x in [("a", 0), ("b", 1.5), ("c", 9)]:
+        made.add_object(name, (vertices + [x, 0, 0], faces))
+    other.add_object("d", (vertices + [10, 0, 0], faces))
+
+    def answers():
+        return (made.in_collision_internal(True), made.min_distance_internal("c", True), made.min_distance_internal(),
+                made.in_collision_other(other, True), made.in_collision_single((vertices, faces), None, True))
+
+    expected = answers()
+    if os.fork() == 0:
+        assert answers() == answers() == expected
+        made.set_transform("c", np.eye(4) - 8 * np.eye(4, k=3))
+        moved = answers()
+        assert moved != expected
+        # And in a child of the child.
+        if os.fork() == 0:
+            assert answers() == moved
+            sys.exit(0)
+        sys.exit(os.waitstatus_to_exitcode(os.wait()[1]))
+    assert os.wait()[1] == 0
+    assert answers() == expected
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_process_goes_on_with_a_manager():
+    here = os.path.dirname(__file__)
+    command = [sys.executable, "-W", "ignore", "-c", FORKED_MANAGERS, here]
+    out = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert (out.returncode, out.stdout) == (0, ""), out.stderr
 
 
 def test_guests_are_kept_and_followed():
