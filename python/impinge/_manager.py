@@ -27,18 +27,43 @@ _Name = Hashable
 _Vector = npt.NDArray[np.float64]
 
 
-class ContactData:
+class _OfTwo:
+    """What is said of two objects, by their names."""
+
+    def __init__(self, pair: tuple[_Name, _Name], indices: tuple[int, int]) -> None:
+        self.pair, self.indices = pair, indices
+        self.names = set(pair)
+
+    def index(self, name: _Name) -> int:
+        """The face of the object of this name. Where both objects have it, an error says so: `indices` has both."""
+        return self.indices[self._side(name, "indices")]
+
+    def _side(self, name: _Name, both: str) -> int:
+        if name not in self.names:
+            raise KeyError(name)
+        if len(self.names) == 1:
+            raise InvalidError(f"name: both objects are called {name!r}: take {both}[0] and {both}[1]")
+        return self.pair.index(name)
+
+    def _faces(self) -> str:
+        return ", ".join(f"{name!r}: {index}" for name, index in zip(self.pair, self.indices))
+
+
+class ContactData(_OfTwo):
     """A contact of two objects.
 
     Attributes
     ----------
     names : set
-        The names of the two objects.
+        The names of the two objects: one name, where those of two managers have the same.
+    pair : tuple of two names
+        First the object that was added first, or is of this manager.
+    indices : tuple of two ints
+        The face of each object, in the order of `pair`.
     point : numpy.ndarray, shape (3,)
         Where they meet.
     normal : numpy.ndarray, shape (3,)
-        The unit direction from the object that was added first (or is of this manager) to the other: pushed apart along it,
-        they overlap less.
+        The unit direction from the first object of `pair` to the second: pushed apart along it, they overlap less.
     depth : float
         Of two convex objects, how far they must be pushed. Of others, the extent of a region of the overlap along the normal:
         pushed that far, they may still overlap. 0 if it is unknown.
@@ -46,31 +71,32 @@ class ContactData:
 
     def __init__(
         self,
-        names: tuple[_Name, _Name],
+        pair: tuple[_Name, _Name],
         indices: tuple[int, int],
         point: _Vector,
         normal: _Vector,
         depth: float,
     ) -> None:
-        self.names = set(names)
+        super().__init__(pair, indices)
         self.point, self.normal, self.depth = point, normal, depth
-        self._indices = dict(zip(names, indices))
-
-    def index(self, name: _Name) -> int:
-        """The face of the object of this name."""
-        return self._indices[name]
 
     def __repr__(self) -> str:
-        return f"ContactData({self._indices}, depth={self.depth:.3g})"
+        return f"ContactData({{{self._faces()}}}, depth={self.depth:.3g})"
 
 
-class DistanceData:
+class DistanceData(_OfTwo):
     """The nearest faces of two objects.
 
     Attributes
     ----------
     names : set
-        The names of the two objects.
+        The names of the two objects: one name, where those of two managers have the same.
+    pair : tuple of two names
+        First the object that was added first, or is of this manager.
+    indices : tuple of two ints
+        The face of each object, in the order of `pair`.
+    points : tuple of two numpy.ndarray, shape (3,)
+        The point of each object that `point` gives, in the order of `pair`.
     distance : float
         0 or less if and only if they share a point, or are nearer than the smallest float; less where they overlap and it is known by
         how much.
@@ -78,26 +104,21 @@ class DistanceData:
 
     def __init__(
         self,
-        names: tuple[_Name, _Name],
+        pair: tuple[_Name, _Name],
         indices: tuple[int, int],
         distance: float,
         points: tuple[_Vector, _Vector],
     ) -> None:
-        self.names = set(names)
-        self.distance = distance
-        self._indices = dict(zip(names, indices))
-        self._points = dict(zip(names, points))
-
-    def index(self, name: _Name) -> int:
-        """The face of the object of this name."""
-        return self._indices[name]
+        super().__init__(pair, indices)
+        self.distance, self.points = distance, points
 
     def point(self, name: _Name) -> _Vector:
-        """The point of this object that is nearest to the other, or deepest in it; where it is unknown how deep, a point that both share."""
-        return self._points[name]
+        """The point of this object that is nearest to the other, or deepest in it; where it is unknown how deep, a point that both share.
+        Where both objects have the name, an error says so: `points` has both."""
+        return self.points[self._side(name, "points")]
 
     def __repr__(self) -> str:
-        return f"DistanceData({self.distance}, {self._indices})"
+        return f"DistanceData({self.distance}, {{{self._faces()}}})"
 
 
 class _Object(NamedTuple):
@@ -296,7 +317,7 @@ class CollisionManager:
         set of name
             The objects that collide with the mesh. With `return_names`.
         list of ContactData
-            As of `in_collision_internal`. The mesh goes by the name ``"__external"``. With `return_data`.
+            As of `in_collision_internal`. The mesh goes by the name ``"__external"``, and is the second of each `pair`. With `return_data`.
         """
         guest = self._own.add("__external", mesh, transform)
         try:
@@ -372,7 +393,7 @@ class CollisionManager:
         name
             Of the nearest object. With `return_name`.
         DistanceData
-            The mesh goes by the name ``"__external"``. With `return_data`.
+            The mesh goes by the name ``"__external"``, and is the second of the `pair`. With `return_data`.
         """
         guest = self._own.add("__external", mesh, transform)
         try:

@@ -257,6 +257,38 @@ def test_two_managers():
     assert len(ours) == 3 and ours.in_collision_internal() is False
 
 
+def test_two_objects_of_one_name():
+    """trimesh's data have one of the two faces, and do not say whose."""
+    ours, theirs = impinge.CollisionManager(**SETTINGS), impinge.CollisionManager(**SETTINGS)
+    ours.add_object("base", cube())
+    theirs.add_object("base", cube(), shift(0.75))
+    distance, names, data = ours.min_distance_other(theirs, True, True)
+    assert names == data.pair == ("base", "base") and data.names == {"base"}
+    assert distance == pytest.approx(-0.25) and data.points[1] - data.points[0] == pytest.approx([-0.25, 0, 0])
+    [contact] = ours.in_collision_other(theirs, return_data=True)[1]
+    assert contact.pair == ("base", "base") and contact.normal.tolist() == [1, 0, 0]
+    assert contact.indices == data.indices
+    with pytest.raises(ValueError, match=r"^name: both objects are called 'base': take indices\[0\] and indices\[1\]"):
+        contact.index("base")
+    with pytest.raises(ValueError, match=r"^name: both objects are called 'base': take points\[0\] and points\[1\]"):
+        data.point("base")
+    for ask in (contact.index, data.point):
+        with pytest.raises(KeyError):
+            ask("foot")
+    # The mesh that is not in the manager comes second.
+    ours.add_object("__external", cube(), shift(5))
+    [contact] = ours.in_collision_single(cube(), shift(5.75), return_data=True)[1]
+    assert contact.pair == ("__external", "__external") and contact.normal.tolist() == [1, 0, 0]
+    assert repr(contact).startswith("ContactData({'__external': ")
+    distance, name, data = ours.min_distance_single(cube(), shift(7), True, True)
+    assert (distance, name, data.pair) == (1, "__external", ("__external", "__external"))
+    assert [point[0] for point in data.points] == [5.5, 6.5] and repr(data).count("__external") == 2
+    # Those of two names come in their order, too.
+    [contact] = ours.in_collision_single(cube(), shift(0.75), return_data=True)[1]
+    assert contact.pair == ("base", "__external") and contact.indices == tuple(map(contact.index, contact.pair))
+    assert {*map(repr, pickled([contact, data]))} == {repr(contact), repr(data)}
+
+
 def test_distances():
     balls = manager(0, 4, 9)
     distance, names, data = balls.min_distance_internal(return_names=True, return_data=True)
