@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from copy import copy
 from functools import cached_property
 from itertools import count
@@ -226,7 +226,8 @@ class CollisionManager:
         name : hashable
             By which it is known from now on. An object that has the name already is replaced.
         mesh
-            Anything that `Scene.add` takes by itself, such as a trimesh, or a pair of vertices and faces.
+            Anything that `Scene.add` takes by itself, such as a trimesh, or a pair of vertices and faces, as a tuple or a list, with a
+            kind behind them where `Scene.add` needs one.
         transform : array_like, shape (4, 4), optional
             Where it is, as for `Scene.set_transform`.
 
@@ -514,7 +515,7 @@ class _Asked:
     def add(self, name: _Name, mesh: Any, transform: _Array | None, after: int = 0) -> Body:
         """Adds a body that comes after those that are there, and by `after` later."""
         scene = self.scene
-        body = scene.add(*mesh) if isinstance(mesh, tuple) else scene.add(mesh)
+        body = scene.add(*_arrays(mesh))
         if transform is not None:
             try:
                 scene.set_transform(body, transform)
@@ -782,6 +783,16 @@ class _Touching:
             self._meshes[body] = mesh
         positions, elements = mesh
         return positions[elements[element]]
+
+
+def _arrays(mesh: Any) -> Sequence[Any]:
+    """A mesh as the arguments of `Scene.add`."""
+    if not isinstance(mesh, (tuple, list)):
+        return (mesh,)
+    if len(mesh) not in (2, 3):
+        given = type(mesh).__name__
+        raise TypeError(f"mesh: a pair of vertices and faces expected, perhaps with a kind, a {given} of {len(mesh)} given")
+    return mesh
 
 
 def _answer(parts: list[Any]) -> Any:

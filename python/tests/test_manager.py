@@ -65,6 +65,10 @@ def test_what_is_no_name_and_no_manager_is_refused():
     vertices, faces = ball(8, 12, np.float64)
     with pytest.raises(TypeError, match="^name: something hashable expected, list given"):
         balls.add_object(["c"], (vertices, faces))
+    for mesh, given in [(vertices.tolist(), "list of 86"), ((vertices,), "tuple of 1"), ([], "list of 0")]:
+        with pytest.raises(TypeError, match=f"^mesh: a pair of vertices and faces expected, .* a {given} given"):
+            balls.add_object("c", mesh)
+    assert balls.in_collision_single([vertices, faces], shift(9.5), True) == (True, {"b"})
     # Nothing has been left behind that would collide.
     assert len(balls) == 2 and balls.in_collision_internal(return_names=True) == (False, set())
     for ask in [balls.in_collision_other, balls.min_distance_other]:
