@@ -145,7 +145,8 @@ class CollisionManager:
     thread, may have one. A forked process may go on with those of its parent.
 
     How deep objects overlap: of two convex ones the shortest way that takes them apart, as FCL has it; of other closed ones how
-    far their deepest region of contact extends along its normal.
+    far their deepest region of contact extends along its normal. Where neighbouring faces of an object turn different ways, it is
+    unknown: `impinge.fix` orients them.
 
     Parameters
     ----------
