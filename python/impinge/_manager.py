@@ -487,7 +487,7 @@ def scene_to_collision(scene: Any, **settings: Any) -> tuple[CollisionManager, d
     return manager, objects
 
 
-#: Detectors of the processes that this one was forked from: they are never ended, for that would wait for their threads.
+#: Detectors of the processes that this one was forked from: what they had there cannot be ended here.
 _OF_PARENTS: list[Detector] = []
 
 
@@ -860,7 +860,9 @@ def _is_convex(vertices: _Array, faces: npt.NDArray[np.uint32]) -> bool:
     heights = np.einsum("ijk,ik->ij", corners[other] - p[one][:, None], normals[one])
     if heights.max() > flat:
         return False
-    # A face without area says nothing of the edge between the faces on its sides: these are compared with all vertices.
-    empty = lengths == 0
+    # A face without area, but for rounding, says nothing of the edge between the faces on its sides: these are compared with all
+    # vertices.
+    longest = np.square(corners - corners[:, [1, 2, 0]]).sum(2).max(1)
+    empty = lengths <= _FLAT * longest
     beside = np.concatenate([one[empty[other]], other[empty[one]]])
     return all(((points - p[face]) @ normals[face]).max() <= flat for face in np.unique(beside).tolist())

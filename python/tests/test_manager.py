@@ -513,6 +513,12 @@ def test_what_is_convex():
         assert not convex(vertices, faces[1:])
     for made in [dented(), bowl(), notched(0.0), notched(0.1)]:
         assert not convex(*made)
+    # Turned, the face without area has one, of rounding.
+    vertices, faces = notched(0.0)
+    for angle in np.linspace(0.1, 6, 40):
+        c, s = np.cos(angle), np.sin(angle)
+        at = vertices @ [[c, s, 0], [-s, c, 0], [0, 0, 1]] @ [[1, 0, 0], [0, c, s], [0, -s, c]]
+        assert not convex(at, faces)
     # A cube with an edge that is closed by a face without area.
     corners, faces = map(np.array, cube())
     edge, n = faces[0, :2], len(corners)
