@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import copyreg
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn, SupportsIndex, overload
 
@@ -140,6 +141,12 @@ class Impact(NamedTuple):
     toi: float
     at_start: bool
 
+    def __copy__(self) -> Impact:
+        return self
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("an Impact names bodies of a live scene: pickle its numbers, such as int(impact.body_a)")
+
 
 class Nearest(NamedTuple):
     """The pair of elements of two bodies that are nearest to each other.
@@ -156,6 +163,12 @@ class Nearest(NamedTuple):
     body_b: Body
     element_b: int
     points: npt.NDArray[np.float64]
+
+    def __copy__(self) -> Nearest:
+        return self
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a Nearest names bodies of a live scene: pickle its numbers, such as int(nearest.body_a)")
 
 
 def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -1242,3 +1255,24 @@ class Truncation(_Motion):
 
     def __repr__(self) -> str:
         return f"Truncation(n_cut={self.n_cut}, {len(self.bodies)} bodies)"
+
+
+def _refused(reason: str) -> Callable[[Any], NoReturn]:
+    def reduce(_: Any) -> NoReturn:
+        raise TypeError(reason)
+
+    return reduce
+
+
+def _reduced(exclusion: _impinge.Exclusion) -> tuple[Any, ...]:
+    try:
+        return exclusion.__reduce__()
+    except TypeError as error:
+        raise TypeError(f"{error}: pickle the scene, and make it there again") from None
+
+
+# Classes of the compiled module of which users pickle something else.
+copyreg.pickle(_impinge.Contacts, _refused("Contacts name bodies of a live scene: pickle their arrays"))
+copyreg.pickle(_impinge.Penetration, _refused("a Penetration names bodies of a live scene: pickle its arrays and regions()"))
+copyreg.pickle(_impinge.CancelToken, _refused("a CancelToken stops questions of its own process alone: pickle none, and make one there"))
+copyreg.pickle(_impinge.Exclusion, _reduced)

@@ -240,6 +240,12 @@ def test_settings_pickle():
     assert copy.deepcopy(detector).detect(scene).hash == detector.detect(scene).hash
 
 
+def a_penetration():
+    scene, detector = impinge.Scene(), impinge.Detector("cpu")
+    a, b = (scene.add(CORNERS[:4] + np.float32(shift), [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]) for shift in (0, 0.1))
+    return detector.penetration(scene, detector.contacts(scene, detector.detect(scene, between=(a, b))), a, b)
+
+
 def test_what_does_not_pickle_says_why(result):
     scene = a_scene()
     detector = impinge.Detector("cpu")
@@ -249,11 +255,20 @@ def test_what_does_not_pickle_says_why(result):
         (detector.impacts(scene), "pickle their arrays"),
         (detector.candidates(scene), "pickle their arrays"),
         (detector.advance(scene), "pickle its arrays"),
+        (detector.contacts(scene, detector.detect(scene)), "^Contacts name bodies of a live scene: pickle their arrays"),
+        (a_penetration(), r"^a Penetration names bodies of a live scene: pickle its arrays and regions\(\)"),
+        (detector.earliest(scene), r"^an Impact names bodies of a live scene: .* int\(impact\.body_a\)"),
+        (detector.nearest(scene), r"^a Nearest names bodies of a live scene: .* int\(nearest\.body_a\)"),
+        (scene.rest_pairs(1.0), "^an Exclusion of pairs names bodies of a live scene: pickle the scene, and make it there"),
+        (impinge.Query(exclude=scene.rest_pairs(1.0)), "pickle the scene, and make it there again"),
+        (impinge.CancelToken(), "^a CancelToken stops questions of its own process alone: .* make one there"),
         (detector.closest(scene, [[0, 0, 0]]), "^a Closest names bodies of a live scene: pickle its arrays"),
         (detector.cast(scene, [[0, 0, 0]], [[0, 0, 1]]), "^Hits name bodies of a live scene: pickle their arrays"),
     ]:
         with pytest.raises(TypeError, match=words):
             pickle.dumps(thing)
+    nearest = detector.nearest(scene)
+    assert copy.copy(nearest) is nearest
 
 
 def test_repr_is_short():
