@@ -53,7 +53,7 @@ class Detector(DetectorBase):
     - MemoryError: no memory for the answer, or a memory budget too small for it;
     - `TooManyPairs`: more pairs than `max_pairs` allows, as soon as that is certain;
     - `Cancelled`: stopped by `cancel`;
-    - RuntimeError: a detector that is busy in another thread or was made before a fork, a GPU failure.
+    - RuntimeError: a detector that is busy in another thread or was made before a fork (but for ``backend="cpu", threads=1``), a GPU failure.
 
     The detector stays usable after each of them.
 

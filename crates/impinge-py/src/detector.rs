@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use impinge::{BodyId, Control, Precision, Query};
+use impinge::{Backend, BodyId, Control, Precision, Query};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -476,6 +476,21 @@ impl DetectorBase {
     }
 }
 
+impl DetectorBase {
+    /// Refuses a detector with threads or a GPU in a fork of the process that made it.
+    fn check_process(&self) -> PyResult<()> {
+        let settings = self.inner.settings();
+        let is_alone = settings.threads == 1 && settings.backend == Backend::Cpu;
+        if is_alone || self.process == std::process::id() {
+            return Ok(());
+        }
+        Err(PyRuntimeError::new_err(
+            "this detector was made before this process was forked, and threads and a GPU do not survive a fork: \
+             make one here",
+        ))
+    }
+}
+
 fn nearest<'py>(
     py: Python<'py>,
     asked: Asked<Option<impinge::proximity::Nearest>>,
@@ -561,12 +576,7 @@ fn ask_about<'py, Q: Sync + Send, T: Send>(
         .try_borrow()
         .map_err(|_| PyRuntimeError::new_err("the scene is being changed by another thread"))?;
     let question = question(&scene, &options)?;
-    if detector.process != std::process::id() {
-        return Err(PyRuntimeError::new_err(
-            "this detector was made before this process was forked, and its threads do not survive a fork: make \
-             one here",
-        ));
-    }
+    detector.check_process()?;
     let watch = Arc::new(Watch::new(options.progress.take(), options.cancel.take()));
     let (inner, bodies) = (&mut detector.inner, &scene.inner);
     let answer = py.detach(|| {
