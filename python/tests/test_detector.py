@@ -159,7 +159,7 @@ def test_frames_follow_the_positions():
         ({"shared_vertex": 0}, TypeError, "^shared_vertex: a string expected, int given"),
         ({"exclude": 0}, TypeError, "^exclude: a pair of bodies, an Exclusion, or a sequence of these, expected, int given"),
         ({"query": {}}, TypeError, "^query: a Query expected, dict given"),
-        ({"betwen": (0, 1)}, TypeError, "^betwen: no such option, which, between, self_of, of, kinds, .*, progress allowed"),
+        ({"betwen": (0, 1)}, TypeError, "^betwen: no such option, which, between, self_of, of, kinds, .*, progress are, each of questions with a use for it"),
         ({"distances": 1}, TypeError, "^distances: True or False expected, int given"),
         ({"kinds": "vf"}, ValueError, "^kinds: kinds of pairs .* given, in this question only pairs of the bodies' own elements allowed$"),
         ({"progress": 1}, TypeError, "^progress: a callable expected, int given"),

@@ -97,7 +97,7 @@ def test_queries_pickle(scene, duplicate):
     [
         ({"which": "none"}, ValueError, '^which: "none" given, "all", "between", "self" allowed'),
         ({"start": 1}, TypeError, "^start: a string expected, int given"),
-        ({"colour": "red"}, TypeError, "^colour: no such option, which, between, .* allowed"),
+        ({"colour": "red"}, TypeError, "^colour: no such option, which, between, .* are, each of questions with a use for it"),
         ({"which": "all", "self_of": 0}, ValueError, "^which and self_of: two choices of pairs given"),
         ({"between": (0,)}, ValueError, "^between: two bodies expected, 1 given"),
         ({"separation": "far"}, TypeError, "^separation: a number expected, str given"),

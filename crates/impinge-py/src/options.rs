@@ -106,7 +106,7 @@ impl<'py> Options<'py> {
         for name in keywords.keys() {
             let name = name.extract::<String>()?;
             if !CONTROL.contains(&name.as_str()) {
-                return Err(unknown(&name, &CONTROL));
+                return Err(unknown(&name, &CONTROL, "allowed"));
             }
         }
         Options::new(keywords)
@@ -174,7 +174,13 @@ impl<'py> Options<'py> {
                 self.scope = Some(Scope::Across(bodies?));
             }
             "_filter" => self.filter = Some(value.cast_into()?),
-            _ => return Err(unknown(name, &NAMES)),
+            _ => {
+                return Err(unknown(
+                    name,
+                    &NAMES,
+                    "are, each of questions with a use for it",
+                ));
+            }
         }
         Ok(())
     }
@@ -259,10 +265,10 @@ pub fn _check_options(options: &Bound<'_, PyDict>) -> PyResult<()> {
 }
 
 /// The names of options are told in Python's way of refusing a keyword.
-fn unknown(name: &str, allowed: &[&str]) -> PyErr {
+fn unknown(name: &str, options: &[&str], end: &str) -> PyErr {
     PyTypeError::new_err(format!(
-        "{name}: no such option, {} allowed",
-        allowed.join(", ")
+        "{name}: no such option, {} {end}",
+        options.join(", ")
     ))
 }
 
