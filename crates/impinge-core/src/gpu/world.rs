@@ -708,9 +708,13 @@ fn fill<'a>(
         let first = run.partition_point(|body| body.vertices().end <= start);
         for body in &run[first..] {
             let vertices = body.vertices();
-            let (from, until) = (vertices.start.max(start), vertices.end.min(end));
-            if from >= until {
+            if vertices.start >= end {
                 break;
+            }
+            let (from, until) = (vertices.start.max(start), vertices.end.min(end));
+            // A body without vertices ends no run.
+            if from >= until {
+                continue;
             }
             let own = [from, until].map(|vertex| (vertex - vertices.start) as usize);
             let bytes = (until - from) * VERTEX;

@@ -6,6 +6,8 @@ mod caller;
 #[cfg(feature = "gpu")]
 #[path = "../common/mod.rs"]
 mod common;
+#[cfg(feature = "gpu")]
+mod empty;
 mod filters;
 #[cfg(feature = "gpu")]
 mod kept;
