@@ -215,7 +215,7 @@ impl Gpu<'_> {
         for &body in &query.fixed {
             scene.body(body)?;
         }
-        let limits = (most, &query.fixed);
+        let limits = (most, query);
         self.with_contacts(scene, query, positions, |engine, job, clusterings| {
             engine.encode_safe(job, clusterings, positions, limits, encoder)
         })

@@ -37,26 +37,27 @@ impl Engine {
         Ok(())
     }
 
-    /// Asks how far vertices may move: those of each body so far.
+    /// Asks how far vertices may move: those of each of these bodies so far. The first bodies are
+    /// those of the world, in its order.
     ///
     /// # Errors
     /// More than the device can bind at once.
     pub(super) fn ask_safe(
         &mut self,
         scene: &Scene,
+        bodies: &[(BodyId, u64)],
         most: f64,
         of_body: impl Fn(BodyId) -> f64,
     ) -> Result<(), Error> {
-        let bodies = self.world.bodies();
-        let limits = bodies.map(|(body, len)| LimitsOf {
+        let limits = bodies.iter().map(|&(body, len)| LimitsOf {
             body,
-            // Vertices fit 32 bits, or the bodies would not be held.
+            // No body has more vertices than 32 bits number.
             len: len as u32,
             most: round_down(of_body(body)).to_bits(),
         });
         let limits = Vec::from_iter(limits);
         let pass_buffers = &mut self.lane.pass_buffers;
-        if pass_buffers.limits_of != limits {
+        if pass_buffers.limits_of != limits || pass_buffers.limits.bytes() == 0 {
             pass_buffers.limits_of.clear();
             let of_body = |of: &LimitsOf| repeat_n(Share { bits: of.most }, of.len as usize);
             let of_vertices: Vec<Share> = limits.iter().flat_map(of_body).collect();

@@ -1,7 +1,7 @@
 //! Frames and steps that stay on the device: positions come from the caller's buffers, pairs go to
 //! ours.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::buffers::{Read, Slice, Uniform, Write, count, read};
@@ -15,6 +15,7 @@ use super::view::Motion;
 use super::world::ResidentEnds;
 use crate::bvh::clusters::Clustering;
 use crate::plan::Plan;
+use crate::query::Query;
 use crate::scene::elements::Part;
 use crate::scene::error::Error;
 use crate::scene::ids::{BodyId, new_stamp};
@@ -141,6 +142,8 @@ pub struct ResidentPart {
 ///             first                        first
 /// ```
 ///
+/// Those of bodies without elements come after all others.
+///
 /// Good for [`Gpu::encode_truncate`](crate::Gpu::encode_truncate) until the same detector encodes
 /// safe distances again, into the same buffer, and for bodies of which topology is the same.
 #[derive(Debug, Clone)]
@@ -253,7 +256,7 @@ impl Engine {
     }
 
     /// Encodes how far vertices may move as one pass: at most `most`, and not at all those of
-    /// `fixed` bodies.
+    /// fixed bodies.
     ///
     /// # Errors
     /// Those of [`Gpu::encode_safe_distances`](crate::Gpu::encode_safe_distances).
@@ -262,7 +265,7 @@ impl Engine {
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
         positions: &[(BodyId, &wgpu::Buffer)],
-        (most, fixed): (f64, &BTreeSet<BodyId>),
+        (most, query): (f64, &Query),
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentSafe, Error> {
         self.gpu.check_lost()?;
@@ -273,23 +276,27 @@ impl Engine {
         }
         let resident = encoded([positions.clone(), positions]);
         self.update(job, clusterings, &resident, &mut Stats::default())?;
-        self.ask_safe(job.scene, most, |body| match fixed.contains(&body) {
-            true => 0.0,
-            false => most,
+        let held = self.with_bare(job.scene, query)?;
+        self.ask_safe(job.scene, &held, most, |body| {
+            match query.fixed.contains(&body) {
+                true => 0.0,
+                false => most,
+            }
         })?;
-        let (mut bodies, mut n) = (Vec::new(), 0);
-        for (body, len) in self.world.bodies() {
+        let (mut bodies, mut n) = (Vec::with_capacity(held.len()), 0);
+        for (body, len) in held {
             bodies.push(ResidentVertices {
                 body,
-                first: n,
-                // Vertices fit 32 bits, or the bodies would not be held.
+                // Vertices fit 32 bits, or their limits would not have been sent.
+                first: n as u32,
                 len: len as u32,
                 topology_stamp: job.scene.body(body)?.topology_stamp(),
             });
-            n += len as u32;
+            n += len;
         }
+        bodies.sort_unstable_by_key(|vertices| vertices.body);
         let shares = &mut self.lane.pass_buffers.shares;
-        shares.resize(&self.gpu, u64::from(n))?;
+        shares.resize(&self.gpu, n)?;
         // Those before are overwritten.
         self.safe_stamp = new_stamp();
         self.encode_work(job, &resident, encoder)?;
@@ -298,6 +305,18 @@ impl Engine {
             bodies,
             stamp: self.safe_stamp,
         })
+    }
+
+    /// The bodies of the world, then those without elements that a query is about: nothing is near
+    /// their vertices. Each with how many vertices it has.
+    fn with_bare(&self, scene: &Scene, query: &Query) -> Result<Vec<(BodyId, u64)>, Error> {
+        let mut bodies = Vec::from_iter(self.world.bodies());
+        for body in query.bodies_of(scene) {
+            if self.world.number(body).is_none() {
+                bodies.push((body, count(scene.body(body)?.n_vertices())));
+            }
+        }
+        Ok(bodies)
     }
 
     /// Encodes how vertices move towards wished positions, which become those that they reach.

@@ -6,6 +6,8 @@ use crate::query::pair_kind::{PairKind, PairKinds};
 use crate::query::pair_set::PairSet;
 use crate::query::step::{Clearance, Hit, PairFilter, Precision, Start, check_distance};
 use crate::query::vertex_lists::VertexLists;
+#[cfg(feature = "gpu")]
+use crate::scene::Scene;
 use crate::scene::error::{Error, shown};
 use crate::scene::ids::BodyId;
 use crate::scene::words::words;
@@ -500,6 +502,16 @@ impl Query {
                 given: shown(self.clearance.share),
                 allowed: "a number from 0 to less than 1",
             }),
+        }
+    }
+
+    /// The bodies that a question is about.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn bodies_of(&self, scene: &Scene) -> Vec<BodyId> {
+        match self.scope {
+            Scope::Between(a, b) => vec![a, b],
+            Scope::SelfOf(body) => vec![body],
+            Scope::Across { .. } | Scope::All { .. } => scene.bodies().map(|(id, _)| id).collect(),
         }
     }
 

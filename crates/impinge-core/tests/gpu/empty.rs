@@ -3,8 +3,8 @@
 //! These tests fail where no adapter is found; a software driver is enough.
 
 use crate::caller::Caller;
-use crate::safe::{check_asked, safe_of};
-use impinge_core::{Backend, BodyId, Detector, Query, Scene, Settings};
+use crate::safe::{Safe, check_asked, safe_of};
+use impinge_core::{Backend, BodyId, Bounds, Detector, Query, Scene, Settings};
 use impinge_scenes::Random;
 
 /// No positions at all.
@@ -131,4 +131,63 @@ fn bodies_without_vertices_lie_between_tasks() {
         let expected = cpu.detect(&scene, &Query::all()).expect("good");
         assert!(found.rows().eq(expected.rows()) && !expected.is_empty());
     }
+}
+
+/// The safe distances of a scene on the host, of bodies of which some take part.
+fn of_host(scene: &Scene, query: &Query) -> Safe {
+    let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+    let found = cpu.safe_distances(scene, 0.1, query).expect("good");
+    let bounds = |body| match found.of(body).expect("held") {
+        Bounds::F32(own) => (body, own.to_vec()),
+        Bounds::F64(_) => panic!("they have positions in single precision"),
+    };
+    found.bodies().map(bounds).collect()
+}
+
+#[test]
+fn safe_distances_of_what_has_no_elements_are_those_of_the_host() {
+    let caller = Caller::new();
+    let nothing = Scene::new();
+    let mut scenes = vec![("no bodies", nothing.clone())];
+    for kind in 0..4 {
+        let mut scene = nothing.clone();
+        add_empty(&mut scene, kind);
+        scenes.push(("a body without vertices", scene));
+    }
+    let mut unused = nothing.clone();
+    let lone = [[0.0f32; 3], [1.0, 0.0, 0.0]];
+    let body = unused.add_triangles(&[], &lone).expect("good");
+    scenes.push(("vertices without elements", unused.clone()));
+    for (name, scene) in &scenes {
+        let mut detector = caller.detector(Settings::default());
+        let safe = safe_of(&caller, &mut detector, scene, 0.1, &Query::all(), &[]);
+        assert_eq!(safe, of_host(scene, &Query::all()), "{name}");
+    }
+    // Beside others, first and last, in any order of questions.
+    let face = [[0.0f32, 0.0, 9.0], [4.0, 0.0, 9.0], [0.0, 4.0, 9.0]];
+    unused.add_triangles(&[[0, 1, 2]], &face).expect("good");
+    add_empty(&mut unused, 1);
+    let last = unused.add_edges(&[], &lone).expect("good");
+    let mut detector = caller.detector(Settings::default());
+    for query in [Query::all(), Query::all().fixed([body])] {
+        let safe = safe_of(&caller, &mut detector, &unused, 0.1, &query, &[]);
+        assert_eq!(safe, of_host(&unused, &query));
+        let none = safe_of(&caller, &mut detector, &nothing, 0.1, &Query::all(), &[]);
+        assert!(none.is_empty());
+    }
+    // They may be truncated, too.
+    let [at, wish] = [lone, lone.map(|[x, y, z]| [x, y, z + 7.0])];
+    let (start, end) = (caller.upload(&at), caller.upload(&wish));
+    let mut encoder = caller.encoder();
+    let mut gpu = detector.gpu().expect("a device");
+    let query = Query::all();
+    let given = [(last, &start)];
+    let safe = gpu.encode_safe_distances(&unused, 0.1, &query, &given, &mut encoder);
+    let safe = safe.expect("good");
+    gpu.encode_truncate(&unused, &safe, &given, &[(last, &end)], &mut encoder)
+        .expect("good");
+    caller.queue.submit([encoder.finish()]);
+    let reached = caller.read(&end);
+    let z = f32::from_bits(reached[2]);
+    assert!(z > 0.0999 && z <= 0.1, "{z}");
 }
