@@ -99,8 +99,9 @@ impl Gpu<'_> {
     /// # Errors
     /// Those of [`detect`](Detector::detect) about the query; a body with two buffers, a buffer that
     /// is too small or lacks its usage; a query for [one cell](Query::owned_by); a detector without
-    /// a GPU, a lost device; a frame larger than the device or the memory budget can hold. Device
-    /// errors go to the device's owner, and so do those of kernels, which the first frame compiles.
+    /// a device of the caller's, a lost one; a frame larger than the device or the memory budget can
+    /// hold. Device errors go to the device's owner, and so do those of kernels, which the first
+    /// frame compiles.
     pub fn encode(
         &mut self,
         scene: &Scene,
@@ -118,7 +119,7 @@ impl Gpu<'_> {
         let plan = Plan::intersections(scene, query, Goal::All, self.detector.settings.limits())?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;
-        on_device(&mut self.detector.gpu)?.encode(job, positions, encoder)
+        on_callers_device(&mut self.detector.gpu)?.encode(job, positions, encoder)
     }
 
     /// Encodes a whole step into the caller's encoder: positions at the start and at the end come
@@ -248,8 +249,9 @@ impl Gpu<'_> {
     /// # Errors
     /// Safe distances that are not the last ones of this detector, or of a body that is no longer
     /// the same; a body without safe distances, with `ends` alone or with two buffers, a buffer that
-    /// is too small, lacks a usage, is larger than a binding may be, or is that of both ends; a lost
-    /// device, a detector that works on the CPU.
+    /// is too small, lacks a usage, is larger than a binding may be, or is that of both ends; end
+    /// positions of a body with vertices in a buffer that is given for another, too; a lost device, a
+    /// detector without one of the caller's.
     pub fn encode_truncate(
         &mut self,
         scene: &Scene,
@@ -258,7 +260,8 @@ impl Gpu<'_> {
         ends: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), Error> {
-        on_device(&mut self.detector.gpu)?.encode_truncate(scene, safe, [starts, ends], encoder)
+        let engine = on_callers_device(&mut self.detector.gpu)?;
+        engine.encode_truncate(scene, safe, [starts, ends], encoder)
     }
 
     /// Encodes a question about contacts, with the clusters of its parts: those of bodies whose
@@ -270,7 +273,7 @@ impl Gpu<'_> {
         resident: &[(BodyId, &wgpu::Buffer)],
         encode: impl FnOnce(&mut Engine, Job<'_>, &[Arc<Clustering>]) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        let engine = on_device(&mut self.detector.gpu)?;
+        let engine = on_callers_device(&mut self.detector.gpu)?;
         let plan = Plan::contacts(scene, query, Goal::All, self.detector.settings.limits())?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;
@@ -324,11 +327,22 @@ impl Gpu<'_> {
     }
 }
 
-/// The device of a detector that has one.
-fn on_device(gpu: &mut Option<Engine>) -> Result<&mut Engine, Error> {
-    gpu.as_mut().ok_or_else(|| Error::NoAdapter {
+/// The device of the caller's on which a detector works.
+///
+/// # Errors
+/// It works on the CPU, or on a device of its own, of which no encoder and no buffer can be.
+fn on_callers_device(gpu: &mut Option<Engine>) -> Result<&mut Engine, Error> {
+    let engine = gpu.as_mut().ok_or_else(|| Error::NoAdapter {
         found: "this detector works on the CPU".to_owned(),
-    })
+    })?;
+    if engine.gpu().is_own() {
+        return Err(Error::Gpu {
+            what: "nothing can be encoded for a detector that opened a device of its own: give it \
+                   yours with Settings::on_device"
+                .to_owned(),
+        });
+    }
+    Ok(engine)
 }
 
 /// What a device can take of lengths: up to [`MOST_KEPT`].

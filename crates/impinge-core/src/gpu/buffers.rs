@@ -346,7 +346,11 @@ pub async fn map(
         }
     });
     scopes.close().await?;
-    let failed = |what: String| Error::Gpu { what };
+    // It may have been lost meanwhile.
+    let failed = |what: String| match gpu.check_lost() {
+        Ok(()) => Error::Gpu { what },
+        Err(lost) => lost,
+    };
     mapping.await.map_err(|error| failed(error.to_string()))?;
     buffer
         .get_mapped_range(0..bytes)

@@ -75,7 +75,7 @@ pub struct Device {
     pub has_timestamps: bool,
     info: DeviceInfo,
     lost: Arc<Mutex<Option<String>>>,
-    /// Whether a callback records the loss.
+    /// Whether a callback records the loss: that of a device of our own.
     listens: bool,
 }
 
@@ -108,6 +108,11 @@ impl Device {
                 let mut of_pass = of_pass.lock().unwrap_or_else(PoisonError::into_inner);
                 *of_pass = Some(format!("device lost ({reason:?}): {message}"));
             });
+    }
+
+    /// Whether a detector has opened it, and not the caller.
+    pub fn is_own(&self) -> bool {
+        self.listens
     }
 
     /// The adapter's name.

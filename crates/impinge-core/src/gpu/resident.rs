@@ -339,12 +339,13 @@ impl Engine {
             });
         }
         let starts = by_body(starts, "positions")?;
-        by_body(ends, "end positions")?;
+        let ends = by_body(ends, "end positions")?;
         let held = safe.bodies.iter();
         let held: BTreeMap<_, _> = held.map(|vertices| (vertices.body, vertices)).collect();
+        refuse_shared(&held, &starts, &ends)?;
         let mut recording = Recording::default();
         recording.stage("truncate");
-        for &(body, end) in ends {
+        for (&body, &end) in &ends {
             let refused = |why: &str| Error::Gpu {
                 what: format!("body {body}: {why}"),
             };
@@ -490,6 +491,41 @@ fn by_body<'a>(
         }
     }
     Ok(held)
+}
+
+/// Refuses end positions in a buffer that holds what another body reads or writes. Bodies without
+/// vertices do neither.
+fn refuse_shared(
+    held: &BTreeMap<BodyId, &ResidentVertices>,
+    starts: &BTreeMap<BodyId, &wgpu::Buffer>,
+    ends: &BTreeMap<BodyId, &wgpu::Buffer>,
+) -> Result<(), Error> {
+    let is_empty = |body: &BodyId| held.get(body).is_some_and(|vertices| vertices.len == 0);
+    let all = [("end positions", ends), ("positions", starts)];
+    let mut all: Vec<(&wgpu::Buffer, BodyId, &str)> = all
+        .into_iter()
+        .flat_map(|(what, buffers)| {
+            buffers
+                .iter()
+                .map(move |(&body, &buffer)| (buffer, body, what))
+        })
+        .collect();
+    // Stable: of each buffer, end positions come first.
+    all.sort_by_key(|of| of.0);
+    for same in all.chunk_by(|a, b| a.0 == b.0) {
+        let mut same = same.iter().filter(|(_, body, _)| !is_empty(body));
+        let Some((_, body, "end positions")) = same.next() else {
+            continue;
+        };
+        if let Some((_, other, what)) = same.find(|(_, other, _)| other != body) {
+            return Err(Error::Gpu {
+                what: format!(
+                    "body {body}: its end positions are in the buffer of the {what} of body {other}"
+                ),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Buffers by their bodies. Refuses those that do not hold a body's positions, or cannot be copied

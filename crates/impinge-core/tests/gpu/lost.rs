@@ -2,8 +2,10 @@
 //!
 //! These tests fail where no adapter is found; a software driver is enough.
 
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::{Context, Poll, Waker};
 
 use crate::caller::Caller;
 
@@ -165,4 +167,57 @@ fn the_cpu_takes_over_from_a_lost_device() {
     assert_eq!((pairs.len(), &*pairs.stats().backend), (1, "cpu"));
     let impacts = steps.impacts(&scene, &query).expect("the CPU answers");
     assert_eq!(impacts.stats().backend, "cpu");
+}
+
+/// As where another thread destroys the device while the first one waits for it.
+#[test]
+fn a_device_that_is_lost_during_a_question_is_named() {
+    let (scene, _) = crossed();
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let mut encoder = caller.encoder();
+    let mut gpu = detector.gpu().expect("a device");
+    gpu.encode(&scene, &Query::all(), &[], &mut encoder)
+        .expect("good");
+    caller.queue.submit([encoder.finish()]);
+    let mut grown = pin!(gpu.grow_async());
+    let mut context = Context::from_waker(Waker::noop());
+    assert!(grown.as_mut().poll(&mut context).is_pending());
+    caller.device.destroy();
+    let _ = caller.device.poll(wgpu::PollType::wait_indefinitely());
+    let Poll::Ready(Err(error)) = grown.as_mut().poll(&mut context) else {
+        panic!("an error");
+    };
+    assert!(error.to_string().contains("device lost"), "{error}");
+}
+
+/// Nobody else can make encoders and buffers on a device that a detector has opened.
+#[test]
+fn nothing_is_encoded_on_a_device_of_the_detectors_own() {
+    let (scene, at) = crossed();
+    let body = scene.bodies().map(|(id, _)| id).next().expect("two");
+    let query = Query::all();
+    let caller = Caller::new();
+    let mut safe = caller.detector(Settings::default());
+    let mut encoder = caller.encoder();
+    let mut gpu = safe.gpu().expect("a device");
+    let safe = gpu.encode_safe_distances(&scene, 1.0, &query, &[], &mut encoder);
+    let safe = safe.expect("good");
+    let [start, end] = [(); 2].map(|()| caller.upload(&at));
+    let (starts, ends) = ([(body, &start)], [(body, &end)]);
+    let mut detector = Detector::new(Backend::Gpu).expect("a device");
+    let mut gpu = detector.gpu().expect("a device");
+    for refused in [
+        gpu.encode(&scene, &query, &starts, &mut encoder).map(drop),
+        gpu.encode_step(&scene, &query, &starts, &ends, &mut encoder)
+            .map(drop),
+        gpu.encode_safe_distances(&scene, 1.0, &query, &starts, &mut encoder)
+            .map(drop),
+        gpu.encode_truncate(&scene, &safe, &starts, &ends, &mut encoder),
+    ] {
+        let text = refused.expect_err("refused").to_string();
+        assert!(text.contains("Settings::on_device"), "{text}");
+    }
+    assert!(gpu.grow().expect("nothing was encoded"));
+    assert_eq!(detector.detect(&scene, &query).expect("good").len(), 1);
 }

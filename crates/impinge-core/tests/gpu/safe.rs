@@ -833,6 +833,53 @@ fn buffers_of_a_truncation_are_refused_by_name() {
 }
 
 #[test]
+fn bodies_whose_truncation_would_write_into_one_buffer_are_refused() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let (scene, starts, wished) = meeting();
+    let [(a, at_a), (b, at_b)] = &starts[..] else {
+        panic!("two bodies");
+    };
+    let [start_a, start_b] = [at_a, at_b].map(|at| caller.upload(at));
+    let [end_a, end_b] = [0, 1].map(|ix| caller.upload(&wished[ix]));
+    let mut encoder = caller.encoder();
+    let mut gpu = detector.gpu().expect("a device");
+    let safe = gpu.encode_safe_distances(&scene, 0.1, &Query::all(), &[], &mut encoder);
+    let safe = safe.expect("good");
+    let from = [(*a, &start_a), (*b, &start_b)];
+    for (starts, ends, words) in [
+        (
+            from,
+            [(*a, &end_a), (*b, &end_a)],
+            "its end positions are in the buffer of the end positions of body",
+        ),
+        (
+            from,
+            [(*a, &start_b), (*b, &end_b)],
+            "its end positions are in the buffer of the positions of body",
+        ),
+        (
+            from,
+            [(*a, &end_a), (*b, &start_a)],
+            "its end positions are in the buffer of the positions of body",
+        ),
+    ] {
+        let refused = gpu.encode_truncate(&scene, &safe, &starts, &ends, &mut encoder);
+        let text = refused.expect_err("refused").to_string();
+        let names = [a, b].map(|body| format!("body {body}"));
+        let has_names = names.iter().all(|name| text.contains(name));
+        assert!(text.contains(words) && has_names, "{text}");
+    }
+    // What is read may be shared.
+    let (starts, ends) = (
+        [(*a, &start_a), (*b, &start_a)],
+        [(*a, &end_a), (*b, &end_b)],
+    );
+    gpu.encode_truncate(&scene, &safe, &starts, &ends, &mut encoder)
+        .expect("good");
+}
+
+#[test]
 fn safe_distances_that_are_no_longer_good_are_refused() {
     let caller = Caller::new();
     let mut detector = caller.detector(Settings::default());
