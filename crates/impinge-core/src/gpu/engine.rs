@@ -35,6 +35,8 @@ const MOST_CELLS: u64 = 1 << 25;
 /// The share of a memory budget that cells may have.
 const SHARE_OF_CELLS: u64 = 8;
 
+/// More bytes than the levels of trees take, and a list of no pairs.
+const VIEWS: u64 = 1024;
 /// The largest buffer that 32 bits can number: positions by words, slots with a flag.
 const WIDEST: u64 = 1 << 34;
 
@@ -533,11 +535,15 @@ impl Engine {
 
     /// The part of the budget that is left for buffers that grow.
     pub(super) fn budget_for_buffers(&self) -> Option<u64> {
+        let budget = self.settings.memory_budget;
+        budget.map(|budget| budget.saturating_sub(self.bytes_besides()))
+    }
+
+    /// Bytes held besides buffers that grow.
+    fn bytes_besides(&self) -> u64 {
         let other = self.other.pass_buffers.bytes();
         let own = &self.lane.pass_buffers;
-        let fixed = self.world.bytes() + other + own.bytes_of_cells() + own.bytes_of_elements();
-        let budget = self.settings.memory_budget;
-        budget.map(|budget| budget.saturating_sub(fixed))
+        self.world.bytes() + other + own.bytes_of_cells() + own.bytes_of_elements()
     }
 
     /// Sets the room from the next frame on.
@@ -590,14 +596,36 @@ impl Engine {
         Ok(least)
     }
 
+    /// The error about work that needs this much room, besides what is held.
     pub(super) fn too_small(&self, what: &'static str, needed: Capacities) -> Error {
-        match self.settings.memory_budget {
-            Some(budget) => Error::MemoryBudget {
+        self.beyond(what, Some(self.bytes_besides() + needed.bytes()))
+    }
+
+    /// The error about a question whose topology and positions do not [fit](Engine::is_held): with
+    /// all that its smallest pass has on the device, `of_elements` being what is known of each.
+    pub(super) fn not_held(
+        &self,
+        what: &'static str,
+        (job, clusterings): (Job<'_>, &[Arc<Clustering>]),
+        of_elements: u64,
+    ) -> Error {
+        let of_elements = of_elements.max(self.lane.pass_buffers.bytes_of_elements());
+        let least = Capacities::LEAST.of(self.lane.method).bytes();
+        let besides = VIEWS + self.other.pass_buffers.bytes() + of_elements + least;
+        let weight = weigh(job, self.lane.motion, clusterings);
+        self.beyond(what, weight.map(|weight| weight.bytes() + besides))
+    }
+
+    /// The error about what needs so many bytes, or more than 32 bits number: of the budget, if it
+    /// has fewer.
+    fn beyond(&self, what: &'static str, needed: Option<u64>) -> Error {
+        match (self.settings.memory_budget, needed) {
+            (Some(budget), Some(needed)) if needed > budget => Error::MemoryBudget {
                 what,
-                needed: self.world.bytes() + needed.bytes(),
+                needed,
                 budget,
             },
-            None => Error::Gpu {
+            _ => Error::Gpu {
                 what: format!("{} cannot hold {what}", self.gpu.name()),
             },
         }

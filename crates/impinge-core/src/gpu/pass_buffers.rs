@@ -430,6 +430,19 @@ impl PassCounts {
         sought == Goal::Any && self.touches_by.is_some()
     }
 
+    /// The room that the pass should have had, as far as the device can bind it. Buffers that were
+    /// too small get a quarter more than needed: the next frame may need a little more.
+    pub fn larger(&self, gpu: &GpuContext, pass_buffers: Capacities) -> Capacities {
+        let larger = self.needed.zip(pass_buffers, |needed, pass_buffers| {
+            if needed > pass_buffers {
+                needed + needed / 4
+            } else {
+                pass_buffers
+            }
+        });
+        larger.within(gpu)
+    }
+
     /// Compares the counts with the room that the pass had. `bytes`: the most that these buffers
     /// may take together.
     pub fn judge(
@@ -444,16 +457,7 @@ impl PassCounts {
         if self.needed.fits(pass_buffers) {
             return NextPass::Complete;
         }
-        let limit = Capacities::limit(gpu);
-        // Too small buffers get a quarter more than needed: the next frame may need a little more.
-        let larger = self.needed.zip(pass_buffers, |needed, pass_buffers| {
-            if needed > pass_buffers {
-                needed + needed / 4
-            } else {
-                pass_buffers
-            }
-        });
-        let larger = larger.zip(limit, u64::min);
+        let larger = self.larger(gpu, pass_buffers);
         let is_allowed = bytes.is_none_or(|bytes| larger.bytes() <= bytes);
         if self.needed.fits(larger) && is_allowed {
             NextPass::Grow(larger)

@@ -196,7 +196,9 @@ impl Engine {
         let mut below = Vec::new();
         for &seed in seeds {
             if !self.world.expand(plan, self.lane.motion, seed, &mut below) {
-                return Err(self.too_small("two clusters", Capacities::LEAST));
+                let room = self.lane.pass_buffers.capacities();
+                let larger = collected.counts.larger(&self.gpu, room);
+                return Err(self.too_small("two clusters", larger));
             }
         }
         Ok(Some(match below.is_empty() {

@@ -8,8 +8,8 @@ use super::buffers::{Read, Slice, Uniform, Write, count, read};
 use super::clusters::GROUP;
 use super::engine::Engine;
 use super::kernels::Truncate;
-use super::layout::{Counter, N_PAIRS_LISTED, N_UNSURE_LISTED, Params, TOUCHES_BY};
-use super::pass_buffers::{Capacities, NextPass, PassCounts};
+use super::layout::{Counter, N_PAIRS_LISTED, N_UNSURE_LISTED, Params, Share, TOUCHES_BY};
+use super::pass_buffers::{NextPass, PassCounts};
 use super::recording::{Recording, Workgroups};
 use super::view::Motion;
 use super::world::ResidentEnds;
@@ -172,6 +172,7 @@ pub struct ResidentVertices {
 }
 
 const COUNTER: u64 = size_of::<Counter>() as u64;
+const SHARE: u64 = size_of::<Share>() as u64;
 
 impl Engine {
     /// Encodes all work of a frame as one pass.
@@ -231,7 +232,11 @@ impl Engine {
         let resident = encoded([starts, ends]);
         self.turn_to(Motion::Moving);
         if !self.is_held(job, clusterings) {
-            return Err(self.too_small("the step at once", Capacities::LEAST));
+            let bodies = plan.parts.iter().map(|part| part.id);
+            let bodies = bodies.filter(|_| plan.keeps_distance());
+            let of_elements = SHARE * n_vertices(scene, bodies.collect());
+            let of = (job, clusterings);
+            return Err(self.not_held("the step at once", of, of_elements));
         }
         self.update(job, clusterings, &resident, &mut Stats::default())?;
         self.ask_kept(scene, plan)?;
@@ -272,7 +277,9 @@ impl Engine {
         let positions = checked(job.scene, positions, "positions")?;
         self.turn_to(Motion::Moving);
         if !self.is_held(job, clusterings) {
-            return Err(self.too_small("the bodies at once", Capacities::LEAST));
+            let of_elements = 3 * SHARE * n_vertices(job.scene, query.bodies_of(job.scene));
+            let of = (job, clusterings);
+            return Err(self.not_held("the bodies at once", of, of_elements));
         }
         let resident = encoded([positions.clone(), positions]);
         self.update(job, clusterings, &resident, &mut Stats::default())?;
@@ -464,7 +471,10 @@ impl Engine {
                 self.grow_to(larger);
                 Ok(false)
             }
-            NextPass::Split => Err(self.too_small("the plan at once", counts.needed)),
+            NextPass::Split => {
+                let larger = counts.larger(self.gpu(), capacities);
+                Err(self.too_small("the plan at once", larger))
+            }
         }
     }
 }
@@ -475,6 +485,14 @@ fn encoded(buffers: [BTreeMap<BodyId, &wgpu::Buffer>; 2]) -> ResidentEnds<'_> {
         buffers,
         is_encoded: true,
     }
+}
+
+/// How many vertices some bodies have together, each once.
+fn n_vertices(scene: &Scene, mut bodies: Vec<BodyId>) -> u64 {
+    bodies.sort_unstable();
+    bodies.dedup();
+    let own = |id: BodyId| count(scene.body_in(id.slot()).n_vertices());
+    bodies.into_iter().map(own).sum()
 }
 
 /// Buffers by their bodies. Refuses a body that has two.

@@ -382,6 +382,74 @@ fn lists_that_are_too_small_grow() {
     );
 }
 
+/// A budget as large as an error says is enough, for encoding and then for making room.
+#[test]
+fn errors_name_a_budget_that_is_enough() {
+    let caller = Caller::new();
+    let (mut scene, query) = (Scene::new(), Query::all());
+    let ball = surfaces::ball(3000);
+    ball.add_to(&mut scene).expect("good");
+    ball.translated([0.02, 0.0, 0.0])
+        .add_to(&mut scene)
+        .expect("good");
+    type Encode = fn(&mut Detector, &Scene, &Query, &mut wgpu::CommandEncoder) -> Result<(), Error>;
+    let questions: [(&str, Encode); 3] = [
+        ("frame", |detector, scene, query, encoder| {
+            let mut gpu = detector.gpu().expect("a device");
+            gpu.encode(scene, query, &[], encoder).map(drop)
+        }),
+        ("step", |detector, scene, query, encoder| {
+            let mut gpu = detector.gpu().expect("a device");
+            gpu.encode_step(scene, query, &[], &[], encoder).map(drop)
+        }),
+        ("safe distances", |detector, scene, query, encoder| {
+            let mut gpu = detector.gpu().expect("a device");
+            gpu.encode_safe_distances(scene, 0.05, query, &[], encoder)
+                .map(drop)
+        }),
+    ];
+    for (question, encode) in questions {
+        let mut memory_budget = 400_000;
+        let mut n_refused = [0; 2];
+        let enough = |error: Error, memory_budget: u64| match error {
+            Error::MemoryBudget { needed, budget, .. } => {
+                assert_eq!(budget, memory_budget);
+                assert!(needed > budget, "{question}: {needed} {budget}");
+                needed
+            }
+            error => panic!("{question}: {error}"),
+        };
+        'raised: loop {
+            let settings = Settings::new().memory_budget(Some(memory_budget));
+            let mut detector = caller.detector(settings);
+            loop {
+                let mut encoder = caller.encoder();
+                if let Err(error) = encode(&mut detector, &scene, &query, &mut encoder) {
+                    memory_budget = enough(error, memory_budget);
+                    n_refused[0] += 1;
+                    continue 'raised;
+                }
+                caller.queue.submit([encoder.finish()]);
+                match detector.gpu().expect("a device").grow() {
+                    Ok(true) => break 'raised,
+                    Ok(false) => {}
+                    Err(error) => {
+                        memory_budget = enough(error, memory_budget);
+                        n_refused[1] += 1;
+                        break;
+                    }
+                }
+            }
+        }
+        // Once for what is sent; then once for each stage, the last of which is known once there
+        // is room for those before.
+        assert!(
+            n_refused[0] == 1 && n_refused[1] <= 4,
+            "{question}: {n_refused:?}"
+        );
+    }
+}
+
 #[test]
 fn what_does_not_fit_is_refused_by_name() {
     use wgpu::BufferUsages as Usage;
