@@ -10,7 +10,9 @@ use crate::gpu::{Engine, MOST_KEPT, ResidentPairs, ResidentSafe, ResidentStep};
 use crate::plan::Plan;
 use crate::query::Query;
 use crate::query::goal::Goal;
+use crate::query::pair_kind::{PairKind, PairKinds};
 use crate::query::progress::Control;
+use crate::query::step::Clearance;
 use crate::scene::Scene;
 use crate::scene::error::{Error, shown};
 use crate::scene::ids::BodyId;
@@ -149,7 +151,7 @@ impl Gpu<'_> {
     ///
     /// # Errors
     /// Those of [`encode`](Gpu::encode), for positions at both ends; a query with a clearance or a
-    /// filter; a separation above 2^100, or a body that is thicker.
+    /// filter; a separation above 2^100, or a body of the query that is thicker.
     pub fn encode_step(
         &mut self,
         scene: &Scene,
@@ -158,8 +160,7 @@ impl Gpu<'_> {
         ends: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentStep, Error> {
-        refuse_unknown(query, (MOST_KEPT, KEPT))?;
-        refuse_thickness(scene)?;
+        refuse_unknown(query)?;
         self.with_contacts(scene, query, starts, |engine, job, clusterings| {
             engine.encode_step(job, clusterings, [starts, ends], encoder)
         })
@@ -180,6 +181,10 @@ impl Gpu<'_> {
     /// elements' size; it is 0 for pairs that touch, that are nearer than about 2^-19 of their
     /// size, whose size is below 2^-32, or that have a coordinate beyond 2^40.
     ///
+    /// A query that names an edge and a face, or two faces, is about a vertex and a face and two
+    /// edges of them. What it asks of a step is ignored: a separation, a clearance. Vertices of
+    /// bodies without elements have `most`.
+    ///
     /// `positions` names bodies whose positions are taken from a buffer, as in `encode_step`; all
     /// other positions come from the scene. Positions at the end of a step are ignored. How
     /// [thick](Scene::set_thickness) both elements are is taken from their distance: an edge or a
@@ -194,8 +199,8 @@ impl Gpu<'_> {
     /// nearer to each other.
     ///
     /// # Errors
-    /// As `encode_step`; a separation; a `most` that is negative or above 2^100; fixed bodies that
-    /// are not in the scene.
+    /// As `encode_step`, but for what is asked of a step alone; a `most` that is negative or above
+    /// 2^100; fixed bodies that are not in the scene.
     pub fn encode_safe_distances(
         &mut self,
         scene: &Scene,
@@ -211,8 +216,9 @@ impl Gpu<'_> {
                 allowed: KEPT,
             });
         }
-        refuse_unknown(query, (0.0, "0 for safe distances"))?;
-        refuse_thickness(scene)?;
+        let query = &of_safe(query);
+        query.check_without_filter()?;
+        refuse_unknown(query)?;
         for &body in &query.fixed {
             scene.body(body)?;
         }
@@ -275,6 +281,7 @@ impl Gpu<'_> {
     ) -> Result<T, Error> {
         let engine = on_callers_device(&mut self.detector.gpu)?;
         let plan = Plan::contacts(scene, query, Goal::All, self.detector.settings.limits())?;
+        refuse_thickness(scene, &plan)?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;
         let resident: BTreeSet<BodyId> = resident.iter().map(|&(body, _)| body).collect();
@@ -348,26 +355,48 @@ fn on_callers_device(gpu: &mut Option<Engine>) -> Result<&mut Engine, Error> {
 /// What a device can take of lengths: up to [`MOST_KEPT`].
 const KEPT: &str = "from 0 to 2^100 where it stays on a device";
 
-/// Refuses bodies that are thicker than a device can take.
-fn refuse_thickness(scene: &Scene) -> Result<(), Error> {
-    match (scene.bodies()).find(|(_, body)| body.thickness() > MOST_KEPT) {
+/// Refuses bodies of a question that are thicker than a device can take.
+fn refuse_thickness(scene: &Scene, plan: &Plan) -> Result<(), Error> {
+    let thickness = |body: BodyId| scene.body_in(body.slot()).thickness();
+    let mut bodies = plan.parts.iter().map(|part| part.id);
+    match bodies.find(|&body| thickness(body) > MOST_KEPT) {
         None => Ok(()),
-        Some((id, body)) => Err(Error::Setting {
+        Some(body) => Err(Error::Setting {
             setting: "thickness",
-            given: format!("{} of body {id}", shown(body.thickness())),
+            given: format!("{} of body {body}", shown(thickness(body))),
             allowed: KEPT,
         }),
     }
 }
 
+/// A query as safe distances have it: without what is asked of a step. An edge and a face, or two
+/// faces, are no nearer than a vertex and a face, or two edges, of them.
+fn of_safe(query: &Query) -> Query {
+    let with_faces = [PairKind::EdgeFace, PairKind::FaceFace];
+    let looked_at = |kinds: PairKinds| {
+        let has_faces = with_faces.into_iter().any(|kind| kinds.contains(kind));
+        let is_looked_at = |kind: &PairKind| match kind {
+            PairKind::VertexFace | PairKind::EdgeEdge => has_faces || kinds.contains(*kind),
+            _ => !with_faces.contains(kind) && kinds.contains(*kind),
+        };
+        PairKind::ALL.into_iter().filter(is_looked_at).collect()
+    };
+    Query {
+        kinds: query.kinds.map(looked_at),
+        separation: 0.0,
+        clearance: Clearance::new(0.0),
+        ..query.clone()
+    }
+}
+
 /// Refuses what kernels of steps do not know.
-fn refuse_unknown(query: &Query, (most, allowed): (f64, &'static str)) -> Result<(), Error> {
+fn refuse_unknown(query: &Query) -> Result<(), Error> {
     query.check_step()?;
-    if query.separation > most {
+    if query.separation > MOST_KEPT {
         return Err(Error::Setting {
             setting: "separation",
             given: shown(query.separation),
-            allowed,
+            allowed: KEPT,
         });
     }
     if query.clearance.distance > 0.0 {

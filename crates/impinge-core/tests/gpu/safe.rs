@@ -433,6 +433,47 @@ fn what_the_device_does_not_know_is_refused_by_name() {
     assert!(text.starts_with("thickness: 1e31 of body"), "{text}");
 }
 
+#[test]
+fn what_safe_distances_have_no_use_for_is_ignored() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let (scene, bodies) = small(5, false);
+    let query = Query::all();
+    let mut ask =
+        |scene: &Scene, query: &Query| safe_of(&caller, &mut detector, scene, 0.3, query, &[]);
+    let plain = ask(&scene, &query);
+    let nonsense = query.clone().separation(f64::NAN).clearance(-1.0);
+    for query in [
+        query.clone().separation(0.1),
+        query.clone().clearance(0.1),
+        nonsense,
+    ] {
+        assert_eq!(ask(&scene, &query), plain, "{query:?}");
+    }
+    // An edge and a face are as near as a vertex and a face, or two edges.
+    let looked_at = [PairKind::VertexFace, PairKind::EdgeEdge];
+    let looked_at = ask(&scene, &query.clone().kinds(looked_at));
+    assert_ne!(looked_at, plain);
+    for kind in [PairKind::EdgeFace, PairKind::FaceFace] {
+        let named = query.clone().kinds([kind]);
+        assert_eq!(ask(&scene, &named), looked_at, "{kind:?}");
+        let both = named.kinds([kind, PairKind::EdgeVertex, PairKind::VertexVertex]);
+        let all = PairKind::ALL.into_iter();
+        let all = all.filter(|kind| !matches!(kind, PairKind::EdgeFace | PairKind::FaceFace));
+        let all = query.clone().kinds(all);
+        assert_eq!(ask(&scene, &both), ask(&scene, &all), "{kind:?}");
+    }
+    // A body that the query is not about may be as thick as the host allows.
+    let mut thick = scene.clone();
+    thick.set_thickness(bodies[3].0, 1e40).expect("good");
+    let pair = Query::between(bodies[0].0, bodies[1].0);
+    assert_eq!(ask(&thick, &pair), ask(&scene, &pair));
+    let mut encoder = caller.encoder();
+    let mut gpu = detector.gpu().expect("a device");
+    gpu.encode_step(&thick, &pair, &[], &[], &mut encoder)
+        .expect("good");
+}
+
 /// Large triangles, and points that are very near each: where rounding is as large as distances.
 fn thin(seed: u64) -> Scene {
     let mut random = Random::new(seed);
