@@ -35,10 +35,14 @@ use crate::search::stats::Stats;
 /// given. Do not change the scene between these calls: all may get its positions as they are at the
 /// last one.
 ///
+/// Kernels are compiled once per detector, by the first question that needs them. So keep it:
+/// several detectors on one device of the caller's compile them each for itself.
+///
 /// # Buffers that are given, and buffers that are returned
 ///
-/// A body that is named twice in one list is refused. Buffers of bodies that do not take part in
-/// the query are ignored.
+/// Each body has a buffer of its own, in which its coordinates are tightly packed from the first
+/// byte on; there are neither offsets nor strides. A body that is named twice in one list is
+/// refused. Buffers of bodies that do not take part in the query are ignored.
 ///
 /// Returned buffers have the usages `STORAGE`, `COPY_SRC` and `COPY_DST`, but are to be read only.
 /// They are the detector's: the next question of the same kind, also one of the host, writes into
@@ -101,9 +105,9 @@ impl Gpu<'_> {
     /// # Errors
     /// Those of [`detect`](Detector::detect) about the query; a body with two buffers, a buffer that
     /// is too small or lacks its usage; a query for [one cell](Query::owned_by); a detector without
-    /// a device of the caller's, a lost one; a frame larger than the device or the memory budget can
-    /// hold. Device errors go to the device's owner, and so do those of kernels, which the first
-    /// frame compiles.
+    /// a device of the caller's, a lost one; a frame larger than the device or the memory budget
+    /// can hold. Device errors go to the device's owner, and so do those of kernels, which the
+    /// first frame compiles.
     pub fn encode(
         &mut self,
         scene: &Scene,
@@ -250,14 +254,15 @@ impl Gpu<'_> {
     /// `starts`.
     ///
     /// Buffers hold `(v, 3)` f32 coordinates, and need the usage `STORAGE`. At most one truncation
-    /// may be encoded per submission.
+    /// may be encoded per submission: earlier ones would run with parameters of the last one, and
+    /// move vertices farther than is safe.
     ///
     /// # Errors
     /// Safe distances that are not the last ones of this detector, or of a body that is no longer
     /// the same; a body without safe distances, with `ends` alone or with two buffers, a buffer that
     /// is too small, lacks a usage, is larger than a binding may be, or is that of both ends; end
-    /// positions of a body with vertices in a buffer that is given for another, too; a lost device, a
-    /// detector without one of the caller's.
+    /// positions of a body with vertices in a buffer that is given for another, too; a lost device,
+    /// a detector without one of the caller's.
     pub fn encode_truncate(
         &mut self,
         scene: &Scene,
