@@ -635,19 +635,19 @@ class _Asked:
     def _deepest(self, touching: _Found, across: Body | None) -> _Found:
         """Of all pairs of bodies that share a point the one that overlaps the most. `touching` is one of them: the answer, where
         no depth is known."""
-        rows = Pairs(self.detector._detect(self.scene, _asked(across))).rows
+        pairs = Pairs(self.detector._detect(self.scene, _asked(across)))
+        rows, where = pairs.rows, _Touching(self.detector, self.scene, pairs)
         both, first = np.unique(rows[:, [0, 2]], axis=0, return_index=True)
         deepest = touching
         for (a, b), row in zip(both.tolist(), first.tolist()):
-            distance, ends = self._depth(a, b)
+            distance, ends = self._depth(where, a, b)
             if distance < deepest.distance:
                 elements = int(rows[row, 1]), int(rows[row, 3])
                 deepest = _Found(distance, (a, b), elements, ends)
         return deepest
 
-    def _depth(self, a: int, b: int) -> tuple[float, Any]:
+    def _depth(self, touching: _Touching, a: int, b: int) -> tuple[float, Any]:
         """The distance of two bodies that share a point, less than 0 where they overlap, and the deepest points."""
-        scene, detector = self.scene, self.detector
         if self._is_convex(a) and self._is_convex(b):
             found = self._convex_overlap(a, b)
             if found is None:
@@ -655,8 +655,7 @@ class _Asked:
             depth, normal, deepest = found
             return (-depth if depth else 0.0), (deepest, deepest - depth * normal)
         try:
-            contacts = detector.contacts(scene, detector.detect(scene, between=(a, b)))
-            regions = detector.penetration(scene, contacts, a, b).regions()
+            regions = self.detector.penetration(self.scene, touching.contacts, a, b).regions()
         except (ValueError, TypeError):
             return 0.0, None
         deep = [region for region in regions if region["depth"]]
@@ -825,6 +824,17 @@ def _normal(corners: _Array) -> _Vector:
     return normal / length if length > 0 else normal
 
 
+def _turns(p: _Vector, q: _Vector, r: _Vector) -> float:
+    """How often triangles go around the origin, by their solid angles (Van Oosterom and Strackee 1983); 0 if all are in one plane
+    with it. Each edge of a star that goes around twice bends outwards, too."""
+    volumes = np.einsum("ij,ij->i", p, np.cross(q, r))
+    if np.abs(volumes).max() < 1e-12:
+        return 0.0
+    a, b, c = (np.linalg.norm(x, axis=1) for x in (p, q, r))
+    pq, qr, rp = (np.einsum("ij,ij->i", x, y) for x, y in ((p, q), (q, r), (r, p)))
+    return abs(float(np.arctan2(volumes, a * b * c + pq * c + qr * a + rp * b).sum())) / (2 * np.pi)
+
+
 #: How far vertices of convex bodies may stand out of faces, as a part of their size: those of files are rounded.
 _FLAT = 1e-6
 
@@ -848,11 +858,20 @@ def _is_convex(vertices: _Array, faces: npt.NDArray[np.uint32]) -> bool:
     if len(np.unique(faces)) != len(vertices) or len(vertices) - n_sides // 2 + len(faces) != 2:
         return False
     points = np.asarray(vertices, np.float64)
+    # Around the origin and of size 1: squares of very large or small numbers are none.
+    points = points - (0.5 * points.min(0) + 0.5 * points.max(0))
+    size = np.abs(points).max()
+    if not 0 < size < np.inf:
+        return False
+    points = points / size
+    points -= points.mean(0)
     corners = points[faces]
     p, q, r = corners.transpose(1, 0, 2)
     normals = np.cross(q - p, r - p)
-    if np.einsum("ij,ij->", p - points.mean(0), normals) < 0:
+    if np.einsum("ij,ij->", p, normals) < 0:
         normals = -normals
+    if _turns(p, q, r) > 1.5:
+        return False
     lengths = np.linalg.norm(normals, axis=1)
     normals /= np.maximum(lengths, np.finfo(float).tiny)[:, None]
     one, other = order[::2] // 3, order[1::2] // 3

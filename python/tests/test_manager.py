@@ -608,3 +608,25 @@ def test_the_same_as_trimesh():
     matrix[0, 3] = 12
     ours_far, theirs_far = (m.min_distance_single(box, matrix) for m in (ours, theirs))
     assert abs(ours_far - theirs_far) < 1e-6
+
+
+def test_a_star_that_goes_around_twice_is_not_convex():
+    """Each of its edges bends outwards, and each face turns the same way."""
+    from impinge._manager import _is_convex
+
+    around = np.arange(5) * 2 * np.pi / 5
+    rim = np.stack([np.cos(around), np.sin(around), 0 * around], 1)
+    points = np.concatenate([rim, [[0, 0, 1], [0, 0, -1]]])
+    for step, is_convex in [(1, True), (2, False)]:
+        sides = [(i, (i + step) % 5) for i in range(5)]
+        faces = np.array([[i, j, 5] for i, j in sides] + [[j, i, 6] for i, j in sides], np.uint32)
+        for size in (1, 1e-200, 1e200):
+            assert _is_convex(size * points, faces) is is_convex, (step, size)
+
+
+def test_convexity_does_not_depend_on_the_size():
+    from impinge._manager import _is_convex
+
+    vertices, faces = dented()
+    for size in (1, 1e-160, 1e160):
+        assert _is_convex(size * np.asarray(vertices, np.float64), np.asarray(faces, np.uint32)) is False, size

@@ -231,8 +231,10 @@ fn read_batch(
             Some(skipped) => ix += skipped,
         }
         // Times are counted in steps: what was written in the same step may be later.
-        let is_stale =
-            modified(&meshes[ix]).is_some_and(|mesh| written.is_none_or(|rows| mesh >= rows));
+        let is_newer = modified(&meshes[ix]);
+        let is_newer = is_newer.is_some_and(|mesh| written.is_none_or(|rows| mesh >= rows));
+        // Names that are not UTF-8 may look alike.
+        let is_stale = is_newer || meshes[ix].to_str().is_none();
         rows[ix] = (!is_stale).then_some(row);
         ix += 1;
     }

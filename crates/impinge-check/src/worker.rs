@@ -44,8 +44,7 @@ fn asked(question: &Value) -> Option<PathBuf> {
 }
 
 /// Answers each line of `input`, a path as a JSON string, or an array of its bytes where it is not
-/// UTF-8, with the row of its mesh on a line of
-/// `output`, until the input ends.
+/// UTF-8, with the row of its mesh on a line of `output`, until the input ends.
 ///
 /// # Errors
 /// A line that is no path; an error of input or output.
@@ -54,7 +53,7 @@ pub fn serve(input: impl BufRead, mut output: impl Write, options: &Options) -> 
         let Some(path) = asked(&serde_json::from_str(&line?)?) else {
             return Err(io::Error::new(
                 io::ErrorKind::InvalidData,
-                "expected a path as a JSON string",
+                "expected a path as a JSON string or an array of its bytes",
             ));
         };
         let row = check_file(&path, options);

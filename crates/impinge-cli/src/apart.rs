@@ -73,7 +73,7 @@ fn check_folder(output: &Path) -> Result<(), Error> {
         return Err(refuse(ErrorKind::IsADirectory, text));
     }
     let folder = output.parent().unwrap_or(Path::new(""));
-    if !folder.as_os_str().is_empty() && !folder.exists() {
+    if !folder.as_os_str().is_empty() && !folder.is_dir() {
         let text = format!("there is no folder {}", printable(folder));
         return Err(refuse(ErrorKind::NotFound, text));
     }

@@ -120,6 +120,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         return frames.end(steps.end(args.ask.fail_on_hit));
     }
     let mut outputs = Outputs::new(args, inputs, file.as_ref())?;
+    outputs.check(range.start)?;
     let mut lines = Lines::default();
     if prints {
         Lines::begin()?;
@@ -213,6 +214,19 @@ impl<'a> Outputs<'a> {
         })
     }
 
+    /// Fails if the files of a frame cannot be written there: of the first one before the work.
+    fn check(&self, frame_ix: usize) -> Result<(), Error> {
+        if let Some(files) = &self.args.out {
+            let file = files.frame(frame_ix).map_err(Error::Usage)?;
+            self.inputs.check_frame("--out", &file.path)?;
+        }
+        if let Some(files) = &self.args.png {
+            let file = files.frame(frame_ix).map_err(Error::Usage)?;
+            self.inputs.check_frame("--png", &file.0)?;
+        }
+        Ok(())
+    }
+
     fn frame(
         &mut self,
         frame_ix: usize,
@@ -220,6 +234,7 @@ impl<'a> Outputs<'a> {
         bodies: &[(BodyId, &str)],
         pairs: &Pairs,
     ) -> Result<(), Error> {
+        self.check(frame_ix)?;
         if let Some(rows) = &mut self.rows {
             let frame = rows::frame(frame_ix);
             rows.put(pairs.rows().map(|row| {
@@ -229,12 +244,10 @@ impl<'a> Outputs<'a> {
         }
         if let Some(files) = &self.args.out {
             let file = files.frame(frame_ix).map_err(Error::Usage)?;
-            self.inputs.check_frame("--out", &file.path)?;
             meshes::write(&file, scene, bodies, pairs)?;
         }
         if let (Some(files), Some(drawer)) = (&self.args.png, &mut self.drawer) {
             let file = files.frame(frame_ix).map_err(Error::Usage)?;
-            self.inputs.check_frame("--png", &file.0)?;
             drawer.write(&file.0, scene, bodies, pairs)?;
         }
         Ok(())
