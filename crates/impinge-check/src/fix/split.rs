@@ -98,7 +98,7 @@ pub fn split(
     copy_vertices(
         surface,
         &mut corners,
-        |on_crowded| if on_crowded { edges } else { vertices },
+        (edges, vertices),
         &on_crowded,
         repairs,
     )
@@ -108,7 +108,7 @@ pub fn split(
 fn copy_vertices(
     surface: &mut Surface,
     corners: &mut UnionFind,
-    splits: impl Fn(bool) -> bool,
+    (edges, vertices): (bool, bool),
     on_crowded: &[bool],
     repairs: &mut Repairs,
 ) -> Vec<u32> {
@@ -125,7 +125,7 @@ fn copy_vertices(
         for corner in 0..3 {
             let vertex = surface.faces[face][corner];
             let is_on_crowded = on_crowded[vertex as usize];
-            if !splits(is_on_crowded) {
+            if !(if is_on_crowded { edges } else { vertices }) {
                 continue;
             }
             let fan = corners.root(3 * face as u32 + corner as u32);

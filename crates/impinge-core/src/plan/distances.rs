@@ -116,7 +116,7 @@ impl Plan {
         self.keep_of(elements).distance(pair, ends, unit)
     }
 
-    /// When two elements are first as near as they may come.
+    /// When two elements are first as near as they may come: a bound of that, if no times are asked.
     pub(crate) fn first(
         &self,
         scene: &Scene,
@@ -125,19 +125,11 @@ impl Plan {
         ends: [&[Point; 4]; 2],
     ) -> Option<Contact> {
         let unit = self.unit_roundoff(scene, elements.map(|(part, _)| part));
-        self.keep_of(elements).first(pair, ends, unit)
-    }
-
-    /// Whether they come so near at all: a bound of the first time.
-    pub(crate) fn whenever(
-        &self,
-        scene: &Scene,
-        elements: [(PartIx, ElementIx); 2],
-        pair: ElementPair,
-        ends: [&[Point; 4]; 2],
-    ) -> Option<Contact> {
-        let unit = self.unit_roundoff(scene, elements.map(|(part, _)| part));
-        self.keep_of(elements).whenever(pair, ends, unit)
+        let keep = self.keep_of(elements);
+        match self.asks_times() {
+            true => keep.first(pair, ends, unit),
+            false => keep.whenever(pair, ends, unit),
+        }
     }
 
     /// The contact of two elements that are as near as they may come from the start on.

@@ -183,7 +183,7 @@ pub struct Plan {
     /// The precision of times.
     pub(crate) precision: Precision,
     /// Whether it is asked when pairs touch, or only which do.
-    pub(crate) asks_when: bool,
+    asks_when: bool,
     /// What of the pairs is wanted.
     pub goal: Goal,
     /// What the answer may be.
@@ -452,6 +452,11 @@ impl Plan {
             Question::Intersection if !self.counts_late() => self.goal,
             _ => Goal::All,
         }
+    }
+
+    /// Whether the time of each pair is asked.
+    pub(crate) fn asks_times(&self) -> bool {
+        self.asks_when && self.goal != Goal::Any
     }
 
     /// What of a step is examined, with boxes as they are.

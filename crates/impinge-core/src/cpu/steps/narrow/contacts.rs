@@ -65,8 +65,7 @@ impl FirstContacts {
     /// Prepares for a step.
     pub fn begin(&mut self, n_clusters: u64, plan: &Plan, tuning: &Tuning) {
         (self.goal, self.start) = (plan.goal, plan.start);
-        let asks_when = plan.asks_when && plan.goal != Goal::Any;
-        self.toi = asks_when.then_some(plan.precision);
+        self.toi = plan.asks_times().then_some(plan.precision);
         self.most_close = MOST_CLOSE.max(2 * n_clusters as usize);
         self.full = tuning.decide_from;
         self.counts = NarrowCounts::default();
@@ -208,12 +207,7 @@ impl FirstContacts {
         self.counts.n_unsure += 1;
         let ends = points(world, between, pair, slots);
         let elements = located(world, between, slots);
-        let (plan, scene, ends) = (world.plan, world.scene, ends.each_ref());
-        let contact = match self.toi {
-            Some(_) => plan.first(scene, elements, pair, ends),
-            None => plan.whenever(scene, elements, pair, ends),
-        };
-        if let Some(contact) = contact {
+        if let Some(contact) = (world.plan).first(world.scene, elements, pair, ends.each_ref()) {
             self.report(world, between, slots, contact);
         }
     }
