@@ -870,7 +870,7 @@ class Csr(NamedTuple):
 
     offsets: npt.NDArray[np.uint64]
     indices: npt.NDArray[np.uint32]
-    distances: npt.NDArray[np.float64]
+    distances: npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
 
 class Neighbours:
@@ -880,31 +880,60 @@ class Neighbours:
     and so are the edges and the faces: `first`.
     """
 
-    __slots__ = ("_inner", "_lists")
+    __slots__ = ("_inner", "_lists", "_rooms")
 
     def __init__(self, inner: _impinge.Neighbours) -> None:
         self._inner = inner
         self._lists: dict[tuple[str, bool], Csr] = {}
+        self._rooms: dict[tuple[str, bool], Csr] = {}
 
-    def of(self, kind: _PairKind, *, reverse: bool = False) -> Csr:
+    def _again(self, inner: _impinge.Neighbours) -> None:
+        """Takes another answer. Its lists are read into the memory of those of the one before."""
+        self._inner = inner
+        self._lists.clear()
+
+    def of(self, kind: _PairKind, *, reverse: bool = False, out: Csr | None = None) -> Csr:
         """The lists of a kind of pairs: of ``"vf"``, the faces near each vertex, or with `reverse` the vertices near each face.
 
         Parameters
         ----------
         kind : {"vf", "ee", "ev", "vv", "ef", "ff"}
         reverse : bool
+        out : Csr of arrays, optional
+            Where to write the numbers, instead of new memory: offsets of uint64, indices of uint32, and distances of float64 or
+            float32, which are rounded down once more. They may have room for more.
 
         Returns
         -------
         Csr
-            Arrays that are made once.
+            Arrays that are made once; or the beginnings of those of `out`.
+
+        Raises
+        ------
+        ValueError
+            An array that has no room for all numbers: it says how many it needs. Then nothing is written.
         """
-        if (kind, reverse) not in self._lists:
-            offsets, indices, distances = self._inner.lists(kind, bool(reverse))
-            self._lists[kind, reverse] = Csr(
-                _locked(offsets), _locked(indices), _locked(distances)
-            )
-        return self._lists[kind, reverse]
+        key = (kind, bool(reverse))
+        if out is not None:
+            return self._fill(key, Csr(*out))
+        if key not in self._lists:
+            n_offsets, n = self._inner.sizes(*key)
+            room = self._rooms.get(key)
+            if room is None or room.offsets.size < n_offsets or room.indices.size < n:
+                # A little more than now, if it is not the first answer.
+                more = 0 if room is None else n // 4
+                room = self._rooms[key] = Csr(
+                    np.empty(n_offsets, np.uint64),
+                    np.empty(n + more, np.uint32),
+                    np.empty(n + more, np.float64),
+                )
+            self._lists[key] = Csr(*map(_locked, self._fill(key, room)))
+        return self._lists[key]
+
+    def _fill(self, key: tuple[_PairKind, bool], room: Csr) -> Csr:
+        self._inner.fill(*key, *room)
+        n_offsets, n = self._inner.sizes(*key)
+        return Csr(room.offsets[:n_offsets], room.indices[:n], room.distances[:n])
 
     @property
     def vf(self) -> Csr:

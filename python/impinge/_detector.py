@@ -517,7 +517,12 @@ class Detector(DetectorBase):
         return SafeDistances(self._safe_distances(scene, most, options))
 
     def neighbours(
-        self, scene: Scene, distance: SupportsFloat, **options: Unpack[Options]
+        self,
+        scene: Scene,
+        distance: SupportsFloat,
+        *,
+        out: Neighbours | None = None,
+        **options: Unpack[Options],
     ) -> Neighbours:
         """The pairs of `near` as lists by element, in both directions, with distances that are rounded down.
 
@@ -525,6 +530,9 @@ class Detector(DetectorBase):
         ----------
         scene, distance, **options
             As for `near`.
+        out : Neighbours, optional
+            An earlier answer that is no longer needed: it takes the new one and is returned. Lists that were read from it are read into
+            the same memory if they fit, so arrays of before change.
 
         Returns
         -------
@@ -542,7 +550,13 @@ class Detector(DetectorBase):
         >>> near.first(points, "vertices")
         3
         """
-        return Neighbours(self._neighbours(scene, distance, options))
+        if out is not None and not isinstance(out, Neighbours):
+            raise TypeError(f"out: {type(out).__name__} given, Neighbours allowed")
+        inner = self._neighbours(scene, distance, options)
+        if out is None:
+            return Neighbours(inner)
+        out._again(inner)
+        return out
 
     def distance(
         self, scene: Scene, a: _Body, b: _Body, **control: Unpack[Control]

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -134,6 +135,63 @@ def test_neighbours_are_near_pairs(scene, detector):
     assert turned is lists.of("vf", reverse=True) and not turned.indices.flags.writeable
     assert len(turned.indices) == len(lists.vf.indices) and int(turned.offsets[-1]) == len(turned.indices)
     assert np.isin(turned.indices, np.unique(np.flatnonzero(np.diff(lists.vf.offsets.astype(np.int64))))).all()
+
+
+def test_lists_are_read_into_the_memory_of_those_before(scene, detector):
+    lists = detector.neighbours(scene, 0.3)
+    before, indices = lists.vf, lists.vf.indices.copy()
+    fewer = detector.neighbours(scene, 0.2, out=lists)
+    expected = detector.neighbours(scene, 0.2)
+    assert fewer is lists and 0 < len(lists) == len(expected) < len(indices)
+    for of in ("vf", "fv", "ee"):
+        for ours, theirs in zip(getattr(lists, of), getattr(expected, of)):
+            assert np.array_equal(ours, theirs) and not ours.flags.writeable
+    assert np.shares_memory(lists.vf.indices, before.indices) and np.shares_memory(lists.vf.distances, before.distances)
+    # More do not fit; what was read before is left alone.
+    kept = lists.vf.indices
+    held = kept.copy()
+    detector.neighbours(scene, 0.6, out=lists)
+    assert len(lists.vf.indices) > len(indices) and not np.shares_memory(lists.vf.indices, kept)
+    assert np.array_equal(kept, held)
+    with pytest.raises(ValueError, match="^distance: "):
+        detector.neighbours(scene, -1, out=lists)
+    assert len(lists.vf.indices) > len(indices)
+    with pytest.raises(TypeError, match="^out: Csr given, Neighbours allowed"):
+        detector.neighbours(scene, 0.2, out=expected.vf)
+
+
+def test_lists_are_read_into_arrays_of_the_caller(scene, detector):
+    lists = detector.neighbours(scene, 0.3)
+    csr = lists.vf
+    n_rows, n = len(csr.offsets), len(csr.indices)
+    for dtype in (np.float64, np.float32):
+        room = impinge.Csr(np.zeros(n_rows + 3, np.uint64), np.zeros(n + 5, np.uint32), np.full(n + 5, -1, dtype))
+        got = lists.of("vf", out=room)
+        assert all(np.shares_memory(ours, array) for ours, array in zip(got, room))
+        assert np.array_equal(got.offsets, csr.offsets) and np.array_equal(got.indices, csr.indices)
+        assert got.distances.dtype == dtype and (room.distances[n:] == -1).all()
+        assert (got.distances <= csr.distances).all()
+        # The next single above is above.
+        if dtype == np.float32:
+            assert (np.nextafter(got.distances, np.float32(9)) > csr.distances).all()
+            assert (got.distances.astype(np.float64) < csr.distances).any()
+        else:
+            assert np.array_equal(got.distances, csr.distances)
+    good = [np.zeros(n_rows, np.uint64), np.zeros(n, np.uint32), np.zeros(n)]
+    for at, bad, message in [
+        (0, good[0][1:], f"out.offsets: room for {n_rows - 1} numbers given, {n_rows} needed"),
+        (1, good[1].astype(np.int64), "out.indices: 1 dimensions of int64 given, an array of uint32 with 1 dimension allowed"),
+        (1, good[1][None], "out.indices: 2 dimensions of uint32 given"),
+        (1, np.zeros(2 * n, np.uint32)[::2], "out.indices: an array with gaps given"),
+        (2, np.zeros(n - 1, np.float32), f"out.distances: room for {n - 1} numbers given, {n} needed"),
+        (2, csr.distances, "out.distances: "),
+        (2, None, "out.distances: <class 'NoneType'> given, an array of float64 or float32"),
+    ]:
+        room = [array.copy() for array in good]
+        room[at] = bad
+        with pytest.raises(ValueError, match="^" + re.escape(message)):
+            lists.of("vf", out=room)
+        assert not any(array.any() for array in room[:2])
 
 
 def test_lists_with_a_margin_give_the_same(scene, detector):

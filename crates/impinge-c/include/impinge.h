@@ -891,6 +891,10 @@ impinge_status impinge_neighbours_first(const impinge_neighbours *neighbours, ui
  * than 2^-1045. Views, valid as long as the answer; each may be NULL. A kind that was not asked for has no offsets, or lists without entries. */
 impinge_status impinge_neighbours_lists(const impinge_neighbours *neighbours, uint32_t kind, uint32_t reversed, impinge_array *offsets,
     impinge_array *indices, impinge_array *distances);
+/* Writes these distances in single precision, rounded down once more, to memory of the caller, which has `room` for so many numbers.
+ * INVALID: not for all of them, of which nothing is written then; the message says how many there are, as many as `indices` has rows. */
+impinge_status impinge_neighbours_distances_f32(const impinge_neighbours *neighbours, uint32_t kind, uint32_t reversed,
+    float *distances, size_t room);
 impinge_status impinge_neighbours_stats(const impinge_neighbours *neighbours, impinge_stats *stats);
 void impinge_neighbours_destroy(impinge_neighbours *neighbours);
 

@@ -1,6 +1,6 @@
 //! Which elements are near each element, as lists: `impinge_find_neighbours`.
 
-use impinge::{Csr, Neighbours, PairKind, Part};
+use impinge::{Csr, Neighbours, Part};
 
 use crate::arrays::view_of;
 use crate::detector::impinge_detector;
@@ -35,17 +35,20 @@ impl impinge_neighbours {
         }
     }
 
-    /// Offsets, indices and distances of the lists of one kind.
-    fn lists(&self, kind: PairKind, is_reversed: bool) -> [impinge_array; 3] {
-        let of: &Csr = match is_reversed {
-            true => self.neighbours.reversed(kind),
-            false => self.neighbours.of(kind),
-        };
-        [
-            view_of(&of.offsets),
-            view_of(&of.indices),
-            view_of(&of.distances),
-        ]
+    /// The lists of one kind.
+    fn lists(&self, kind: u32, reversed: u32) -> Result<&Csr, Failure> {
+        let kind = kind_of(kind).ok_or_else(|| {
+            Failure::invalid(format!(
+                "kind: {kind} given, one of IMPINGE_VF, _EE, _EV, _VV, _EF and _FF allowed"
+            ))
+        })?;
+        match reversed {
+            0 => Ok(self.neighbours.of(kind)),
+            1 => Ok(self.neighbours.reversed(kind)),
+            _ => Err(Failure::invalid(format!(
+                "reversed: {reversed} given, 0 or 1 allowed"
+            ))),
+        }
     }
 }
 
@@ -101,23 +104,48 @@ pub unsafe extern "C" fn impinge_neighbours_lists(
 ) -> Status {
     guard(|| {
         // SAFETY: see `impinge_find_neighbours`.
-        let of = unsafe { held(neighbours, "neighbours") }?;
-        let found = kind_of(kind).ok_or_else(|| {
-            Failure::invalid(format!(
-                "kind: {kind} given, one of IMPINGE_VF, _EE, _EV, _VV, _EF and _FF allowed"
-            ))
-        })?;
-        if reversed > 1 {
-            return Err(Failure::invalid(format!(
-                "reversed: {reversed} given, 0 or 1 allowed"
-            )));
-        }
-        let views = of.lists(found, reversed == 1);
+        let lists = unsafe { held(neighbours, "neighbours") }?.lists(kind, reversed)?;
+        let views = [
+            view_of(&lists.offsets),
+            view_of(&lists.indices),
+            view_of(&lists.distances),
+        ];
         for (to, view) in [offsets, indices, distances].into_iter().zip(views) {
             if !to.is_null() {
                 // SAFETY: see `impinge_find_neighbours`.
                 unsafe { to.write_unaligned(view) };
             }
+        }
+        Ok(())
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_neighbours_distances_f32(
+    neighbours: *const impinge_neighbours,
+    kind: u32,
+    reversed: u32,
+    distances: *mut f32,
+    room: usize,
+) -> Status {
+    guard(|| {
+        // SAFETY: see `impinge_find_neighbours`.
+        let lists = unsafe { held(neighbours, "neighbours") }?.lists(kind, reversed)?;
+        let n = lists.distances.len();
+        if room < n {
+            return Err(Failure::invalid(format!(
+                "distances: room for {room} numbers given, {n} needed"
+            )));
+        }
+        if n == 0 {
+            return Ok(());
+        }
+        if distances.is_null() {
+            return Err(Failure::null("distances"));
+        }
+        for (ix, distance) in lists.distances_f32().enumerate() {
+            // SAFETY: The caller has room for so many numbers there.
+            unsafe { distances.add(ix).write_unaligned(distance) };
         }
         Ok(())
     })

@@ -220,6 +220,8 @@ void probes() {
   const auto lists = detector.neighbours(scene, 0.2, query::between_all());
   CHECK(lists.size() > 10 && lists.vf().offsets.size() == 2 * VERTICES + 1 && lists.fv().indices.size() == lists.vf().indices.size());
   CHECK(lists.first(b)[0] == VERTICES && lists.ee().distances.size() == lists.ee().indices.size() && !lists.empty());
+  const auto singles = lists.distances_f32(impinge::pair_kind::vf, true);
+  CHECK(singles.size() == lists.fv().distances.size() && singles[3] <= lists.fv().distances[3] && singles[3] > 0.999 * lists.fv().distances[3]);
   const auto rest = detector.near(scene, 0.2, query::between_all());
   CHECK(detector.near(scene, 0.2, query::between_all().exclude(rest)).empty() && !rest.empty());
   CHECK(detector.near(scene, 0.02, query::self_all().exclude_rings(3)).empty() && !detector.near(scene, 0.02, query::self_all()).empty());

@@ -731,6 +731,25 @@ static void solvers(impinge_detector *detector) {
     uint32_t vertex = row->body_a * VERTICES + row->element_a, face = row->body_b * FACES + row->element_b;
     CHECK(offsets[vertex] == 0 && offsets[vertex + 1] > 0 && ((const uint32_t *)indices.data)[0] == face);
   }
+  {
+    size_t i, n = distances.rows;
+    float *singles = malloc((n + 1) * sizeof *singles);
+    const double *doubles = distances.data;
+    char needed[64];
+    singles[n] = 7;
+    sprintf(needed, "distances: room for %u numbers given, %u needed", (unsigned)(n - 1), (unsigned)n);
+    singles[0] = 7;
+    REFUSED(impinge_neighbours_distances_f32(lists, IMPINGE_VF, 0, singles, n - 1), needed);
+    CHECK(singles[0] == 7);
+    REFUSED(impinge_neighbours_distances_f32(lists, IMPINGE_VF, 0, NULL, n), "distances is NULL");
+    REFUSED(impinge_neighbours_distances_f32(lists, IMPINGE_VF, 2, singles, n), "reversed: 2");
+    GOOD(impinge_neighbours_distances_f32(lists, IMPINGE_VF, 0, singles, n));
+    for (i = 0; i < n; i++)
+      CHECK((double)singles[i] <= doubles[i] && doubles[i] - (double)singles[i] <= doubles[i] / 4194304);
+    CHECK(singles[n] == 7);
+    GOOD(impinge_neighbours_distances_f32(lists, IMPINGE_EV, 0, NULL, 0));
+    free(singles);
+  }
   GOOD(impinge_neighbours_lists(lists, IMPINGE_VF, 1, &view, NULL, NULL));
   CHECK(view.rows == 2 * FACES + 1);
   REFUSED(impinge_neighbours_lists(lists, 3, 0, &view, NULL, NULL), "kind: 3");

@@ -1,7 +1,9 @@
 //! What `impinge.SafeDistances` and `impinge.Neighbours` are made of.
 
 use impinge::{Bounds, Csr, PairKind};
-use numpy::PyArray1;
+use numpy::{
+    Element, PyArray1, PyArrayMethods, PyReadwriteArray1, PyUntypedArray, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -68,39 +70,83 @@ impl Neighbours {
     pub fn new(inner: impinge::Neighbours, scene: u64) -> Self {
         Neighbours { inner, scene }
     }
+
+    /// The lists of a kind, or those of the elements that it names second.
+    fn lists(&self, kind: &Bound<'_, PyAny>, is_reversed: bool) -> PyResult<&Csr> {
+        let kind: PairKind = pair_kind(kind)?;
+        Ok(match is_reversed {
+            true => self.inner.reversed(kind),
+            false => self.inner.of(kind),
+        })
+    }
 }
 
-/// The offsets, indices and distances of lists.
-type Lists<'py> = (
-    Bound<'py, PyArray1<u64>>,
-    Bound<'py, PyArray1<u32>>,
-    Bound<'py, PyArray1<f64>>,
-);
+/// A caller's array, to be written, that has room for so many numbers.
+fn room<'py, T: Element>(
+    array: &Bound<'py, PyAny>,
+    name: &str,
+    types: &str,
+    n: usize,
+) -> PyResult<PyReadwriteArray1<'py, T>> {
+    let refused = |what: String| invalid(format!("out.{name}: {what}"));
+    let Ok(array) = array.cast::<PyArray1<T>>() else {
+        let given = match array.cast::<PyUntypedArray>() {
+            Ok(array) => format!("{} dimensions of {}", array.ndim(), array.dtype()),
+            Err(_) => array.get_type().to_string(),
+        };
+        let allowed = format!("an array of {types} with 1 dimension");
+        return Err(refused(format!("{given} given, {allowed} allowed")));
+    };
+    let array = array.try_readwrite();
+    let mut array = array.map_err(|error| refused(error.to_string()))?;
+    match array.as_slice_mut() {
+        Ok(numbers) if numbers.len() >= n => Ok(array),
+        Ok(numbers) => {
+            let given = numbers.len();
+            Err(refused(format!(
+                "room for {given} numbers given, {n} needed"
+            )))
+        }
+        Err(_) => Err(refused(
+            "an array with gaps given, one without allowed".to_owned(),
+        )),
+    }
+}
 
 #[pymethods]
 impl Neighbours {
-    /// The lists of a kind, or those of the elements that it names second.
-    fn lists<'py>(
+    /// How many offsets and how many indices lists have.
+    fn sizes(&self, kind: &Bound<'_, PyAny>, is_reversed: bool) -> PyResult<(usize, usize)> {
+        let lists = self.lists(kind, is_reversed)?;
+        Ok((lists.offsets.len(), lists.indices.len()))
+    }
+
+    /// Copies lists to the starts of arrays: nothing if one of them does not fit.
+    fn fill(
         &self,
-        py: Python<'py>,
-        kind: &Bound<'py, PyAny>,
+        kind: &Bound<'_, PyAny>,
         is_reversed: bool,
-    ) -> PyResult<Lists<'py>> {
-        let kind: PairKind = pair_kind(kind)?;
-        let Csr {
-            offsets,
-            indices,
-            distances,
-            ..
-        } = match is_reversed {
-            true => self.inner.reversed(kind),
-            false => self.inner.of(kind),
-        };
-        Ok((
-            PyArray1::from_slice(py, offsets),
-            PyArray1::from_slice(py, indices),
-            PyArray1::from_slice(py, distances),
-        ))
+        offsets: &Bound<'_, PyAny>,
+        indices: &Bound<'_, PyAny>,
+        distances: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let lists = self.lists(kind, is_reversed)?;
+        let (n_offsets, n) = (lists.offsets.len(), lists.indices.len());
+        let mut offsets = room::<u64>(offsets, "offsets", "uint64", n_offsets)?;
+        let mut indices = room::<u32>(indices, "indices", "uint32", n)?;
+        if distances.cast::<PyArray1<f32>>().is_ok() {
+            let mut distances = room::<f32>(distances, "distances", "float32", n)?;
+            let room = distances.as_slice_mut()?;
+            room.iter_mut()
+                .zip(lists.distances_f32())
+                .for_each(|(to, distance)| *to = distance);
+        } else {
+            let mut distances = room::<f64>(distances, "distances", "float64 or float32", n)?;
+            distances.as_slice_mut()?[..n].copy_from_slice(&lists.distances);
+        }
+        offsets.as_slice_mut()?[..n_offsets].copy_from_slice(&lists.offsets);
+        indices.as_slice_mut()?[..n].copy_from_slice(&lists.indices);
+        Ok(())
     }
 
     fn first(&self, body: &Bound<'_, PyAny>, part: &Bound<'_, PyAny>) -> PyResult<u32> {

@@ -416,6 +416,12 @@ public:
   csr vf() const & { return of(pair_kind::vf); }
   csr fv() const & { return reversed(pair_kind::vf); }
   csr ee() const & { return of(pair_kind::ee); }
+  /// The distances of lists in single precision, rounded down once more: `of(kind)`, or `reversed(kind)`.
+  std::vector<float> distances_f32(pair_kind kind, bool reversed = false) const {
+    std::vector<float> distances(lists(kind, reversed).distances.size());
+    impinge_neighbours_distances_f32(raw(), static_cast<std::uint32_t>(kind), reversed, distances.data(), distances.size());
+    return distances;
+  }
   impinge_stats stats() const & { return detail::stats_of(impinge_neighbours_stats, raw()); }
   const impinge_neighbours *raw() const noexcept { return handle_.get(); }
   // A temporary ends before its views are read.

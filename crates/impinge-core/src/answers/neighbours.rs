@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::answers::home::{Home, gives_back};
+use crate::bvh::bounds::round_down;
 use crate::plan::{Plan, QueryPart};
 use crate::query::pair_kind::PairKind;
 use crate::scene::Scene;
@@ -44,6 +45,12 @@ impl Csr {
         let range = self.offsets[element] as usize..self.offsets[element + 1] as usize;
         let indices = self.indices[range.clone()].iter().copied();
         indices.zip(self.distances[range].iter().copied())
+    }
+
+    /// The distances in single precision, rounded down once more: also 0 where they are below the
+    /// smallest `f32`.
+    pub fn distances_f32(&self) -> impl ExactSizeIterator<Item = f32> + '_ {
+        self.distances.iter().map(|&distance| round_down(distance))
     }
 
     /// Makes rows of sorted pairs with their distances: a row for one side or for each, with the
