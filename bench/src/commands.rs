@@ -9,7 +9,7 @@ use crate::ours::{Feed, Ours};
 use crate::problem::{Ask, Problem, models, posed};
 use crate::report::{Report, figures, grouped};
 use crate::runner::Runner;
-use crate::{Failure, Options, distance, files, gpu, near, once, resident, step_sizes, steps};
+use crate::{Failure, Options, c, distance, files, gpu, near, once, resident, step_sizes, steps};
 
 /// Runs a command by its name.
 pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
@@ -90,12 +90,18 @@ fn ours(
         runners.push(Box::new(Ours::new(problem, other, Feed::InPlace)?));
     }
     if variants {
-        let copied = Ours::new(problem, clusters.clone(), Feed::Copied)?;
-        runners.push(Box::new(copied));
+        for feed in [Feed::Copied, Feed::Shared] {
+            runners.push(Box::new(Ours::new(problem, clusters.clone(), feed)?));
+        }
         if options.threads == 0 && options.backend == Backend::Cpu {
             let single = clusters.threads(1);
-            runners.push(Box::new(Ours::new(problem, single, Feed::InPlace)?));
+            let feeds = [Feed::InPlace, Feed::Copied, Feed::Shared];
+            let n_feeds = if options.c_library.is_some() { 3 } else { 1 };
+            for feed in &feeds[..n_feeds] {
+                runners.push(Box::new(Ours::new(problem, single.clone(), *feed)?));
+            }
         }
+        runners.extend(c::runners(problem, options)?);
     }
     if options.cells {
         let cells = options.settings(Method::Cells);

@@ -10,6 +10,7 @@
 //! difference. Peers run with the setting that is fastest on the problem, found before the
 //! contest, and need not sort their answer.
 
+mod c;
 mod commands;
 mod distance;
 #[cfg(feature = "embree")]
@@ -81,6 +82,7 @@ options:
   --instruction-set NAME  the widest that impinge may use on the CPU: portable, avx2 or avx512 (default)
   --no-cells         without impinge's other method, Cells
   --no-peers         without Embree and parry
+  --c-library FILE   two-body: also through impinge.h, of this shared library (target/library/libimpinge_c.so)
   --json FILE        figures for machines
   --record NAME      also writes bench/record/NAME/COMMAND.md and .json; NAME is <machine>-<date>
   --help             this text
@@ -102,6 +104,7 @@ pub struct Options {
     instruction_set: InstructionSet,
     cells: bool,
     peers: bool,
+    c_library: Option<PathBuf>,
     json: Option<PathBuf>,
     record: Option<String>,
 }
@@ -133,6 +136,7 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
         instruction_set: InstructionSet::default(),
         cells: true,
         peers: true,
+        c_library: None,
         json: None,
         record: None,
     };
@@ -166,6 +170,7 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
             Long("instruction-set") => options.instruction_set = parser.value()?.parse()?,
             Long("no-cells") => options.cells = false,
             Long("no-peers") => options.peers = false,
+            Long("c-library") => options.c_library = Some(parser.value()?.into()),
             Long("json") => options.json = Some(parser.value()?.into()),
             Long("record") => options.record = Some(parser.value()?.string()?),
             Value(name) if command.is_none() => command = Some(name.string()?),

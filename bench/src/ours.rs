@@ -18,6 +18,8 @@ pub enum Feed {
     InPlace,
     /// Copied and checked by `set_positions` while the clock runs.
     Copied,
+    /// The same of an array that is shared, so nothing is copied.
+    Shared,
 }
 
 /// A detector and its scene.
@@ -27,10 +29,10 @@ pub struct Ours {
     query: Query,
     detector: Detector,
     feed: Feed,
-    /// The positions that `Feed::Copied` copies in the next frame.
-    next: Vec<Arc<[[f32; 3]]>>,
-    /// The positions that it copies, pose by pose.
-    poses: Vec<Vec<Arc<[[f32; 3]]>>>,
+    /// The positions that are set in the next frame.
+    next: Vec<Arc<Vec<[f32; 3]>>>,
+    /// The positions that are set, pose by pose.
+    poses: Vec<Vec<Arc<Vec<[f32; 3]>>>>,
     stats: Stats,
 }
 
@@ -38,11 +40,11 @@ impl Ours {
     /// Sets the problem up.
     pub fn new(problem: &Problem, settings: Settings, feed: Feed) -> Result<Self, Failure> {
         let (scene, ids, query) = problem.scene()?;
-        let pose = |pose: usize| -> Vec<Arc<[[f32; 3]]>> {
-            let copy = |body: &Body| Arc::from(&body.poses[pose][..]);
+        let pose = |pose: usize| -> Vec<Arc<Vec<[f32; 3]>>> {
+            let copy = |body: &Body| Arc::new(body.poses[pose].clone());
             match feed {
                 Feed::InPlace => Vec::new(),
-                Feed::Copied => problem.bodies.iter().map(copy).collect(),
+                Feed::Copied | Feed::Shared => problem.bodies.iter().map(copy).collect(),
             }
         };
         Ok(Ours {
@@ -71,8 +73,10 @@ impl Runner for Ours {
         if settings.affinity == Affinity::Inherited {
             name += ", helpers anywhere";
         }
-        if self.feed == Feed::Copied {
-            name += ", positions copied";
+        match self.feed {
+            Feed::InPlace => {}
+            Feed::Copied => name += ", positions copied",
+            Feed::Shared => name += ", positions shared",
         }
         name
     }
@@ -90,7 +94,7 @@ impl Runner for Ours {
 
     fn load(&mut self, problem: &Problem, pose: usize) -> Result<(), Failure> {
         match self.feed {
-            Feed::Copied => self.next = self.poses[pose].clone(),
+            Feed::Copied | Feed::Shared => self.next = self.poses[pose].clone(),
             Feed::InPlace => {
                 for (&id, body) in self.ids.iter().zip(&problem.bodies) {
                     self.scene
@@ -105,7 +109,10 @@ impl Runner for Ours {
     fn frame(&mut self, verify: bool) -> Result<Answer, Failure> {
         let start = Instant::now();
         for (&id, positions) in self.ids.iter().zip(&self.next) {
-            self.scene.set_positions(id, &positions[..])?;
+            match self.feed {
+                Feed::Shared => self.scene.set_positions(id, positions.clone())?,
+                _ => self.scene.set_positions(id, &positions[..])?,
+            }
         }
         let pairs = self.detector.detect(&self.scene, &self.query)?;
         let ms = start.elapsed().as_secs_f64() * 1e3;
