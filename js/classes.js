@@ -2,7 +2,7 @@
 
 import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, movesOf, nearest, numberOf, pairsOf, queryOf, statsOf } from "./answers.js";
 import { Closest, Hits, Neighbours, SafeDistances, Truncation, integers, places, signed } from "./probe.js";
-import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
+import { KeptPairs, packed, plain, whole, withPoints } from "./query.js";
 import {
   MOVES, TAKE_STEP, body, call, disposable, isList, isSingle, kindOf, list, meshOf, mustBeNone, number, numbers, options,
   refuse, shown, wide, word,
@@ -342,9 +342,16 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     restPairs(distance) {
-      const next = RestPairs.next();
+      const next = KeptPairs.next();
       const n = call(() => this.#held.rest_pairs(next, number("distance", distance)));
-      return new RestPairs(next, n, () => call(() => this.#handle?.forget_rest_pairs(next)));
+      return new KeptPairs(next, n, () => call(() => this.#handle?.forget_pairs(next)));
+    }
+
+    vertexPairs(which, offsets, vertices, other = which) {
+      const next = KeptPairs.next();
+      const lists = [wide(offsets, "offsets"), wide(vertices, "vertices")];
+      call(() => this.#held.vertex_pairs(next, body(which), body(other), ...lists));
+      return new KeptPairs(next, lists[1].length, () => call(() => this.#handle?.forget_pairs(next)));
     }
 
     #size(which) {

@@ -129,7 +129,8 @@ export interface Query extends Control {
    * Pairs that are left out: those of two bodies; with the same body twice, its self-collision; with `{ rings: n }` the pairs of one
    * body that are near in its surface: some vertex of one element is at most n edges, 0 to 16, away from some vertex of the other; with
    * `{ groups: [g, h] }` those of two groups of vertices, or of one with itself, see `setGroups`: each vertex of one element and each
-   * vertex of the other must be in such groups, where several exclusions of groups are one rule, not each its own; or those of `scene.restPairs()`. Answers of `near` are not taken.
+   * vertex of the other must be in such groups, where several exclusions of groups are one rule, not each its own; or those of `scene.restPairs()` and
+   * `scene.vertexPairs()`. Answers of `near` are not taken.
    * Nothing is proven of pairs that are left out: a step that is free, or that `truncate`, `advance` or `safeDistances` allow, may take them
    * through each other.
    */
@@ -180,11 +181,11 @@ export interface Query extends Control {
 /** What a query leaves out. */
 export type Exclusion = readonly [Body, Body] | { readonly rings: number } | { readonly groups: readonly [number, number] } | RestPairs;
 
-/** Pairs of elements that were near when `scene.restPairs()` was asked, to be left out of later questions about that scene. */
+/** Pairs of elements that were near when `scene.restPairs()` was asked, or whose vertices `scene.vertexPairs()` lists, to be left out of later questions about that scene. */
 declare class RestPairs {
   private constructor();
   #number;
-  /** How many there are. */
+  /** How many there are; of `vertexPairs`, how many vertices are listed. */
   readonly length: number;
   /** Lets the scene forget them; refused while a question about it is answered. So does it once they are collected as garbage, whenever that is. */
   dispose(): void;
@@ -266,6 +267,13 @@ export declare class Scene {
    * The scene keeps them until either is disposed of, or the pairs are collected as garbage. Questions about another scene refuse them.
    */
   restPairs(distance: number): RestPairs;
+  /**
+   * Pairs of elements of which some vertices are listed together, to be left out of later questions by `exclude`: what is sewn or glued
+   * together, or handled in another way. The list of vertex v of `body` is `vertices` from `offsets[v]` to `offsets[v + 1]`, vertices of
+   * `other`, or of the same body if it is left out. Both are arrays of whole numbers, such as `Uint32Array`; lists need not be sorted.
+   * Whether they fit the bodies is checked when something is asked. They are kept as those of `restPairs`, and nothing is proven of them, either.
+   */
+  vertexPairs(body: Body, offsets: Index, vertices: Index, other?: Body): RestPairs;
   kind(body: Body): "points" | "edges" | "triangles" | "tetrahedra";
   nElements(body: Body): number;
   nVertices(body: Body): number;

@@ -59,10 +59,10 @@ export function packed(query, length = 0, unsaid = "all") {
 // Calls what makes the module forget pairs that nobody holds any more.
 const lost = new FinalizationRegistry((forget) => forget());
 
-// Pairs that were near when a scene was asked: the module knows them by a number.
-export class RestPairs {
+// Pairs that were near when a scene was asked, or whose vertices are listed: the module knows them by a number.
+export class KeptPairs {
   static #last = 0;
-  static next = () => (RestPairs.#last += 1);
+  static next = () => (KeptPairs.#last += 1);
   static numberOf = (given) => given.#number;
   #number;
   #forget;
@@ -79,11 +79,11 @@ export class RestPairs {
     lost.unregister(this);
   }
 }
-disposable(RestPairs);
+disposable(KeptPairs);
 
-// Three words for what is left out: rings around each element, two groups of vertices, pairs at rest or two bodies.
+// Three words for what is left out: rings around each element, two groups of vertices, pairs that the scene keeps or two bodies.
 function excluded(given) {
-  if (given instanceof RestPairs) return [3, RestPairs.numberOf(given), 0];
+  if (given instanceof KeptPairs) return [3, KeptPairs.numberOf(given), 0];
   if (given === null || typeof given !== "object") refuse(`exclude: ${kindOf(given)} given, as in [[a, b]] an array of two bodies or an object is needed`);
   if (Symbol.iterator in given) return [0, ...two("exclude", given)];
   const { rings, groups, ...others } = given;

@@ -665,6 +665,19 @@ export async function others(module) {
     short: await refusal(() => pile.setGroups(top, new Uint8Array(2))),
     distance: await refusal(() => pile.restPairs(-1)),
   };
+  // Of the two triangles, all pairs with vertex 0 of both, by one list, and by one that lists it twice.
+  const [from, listed] = [new Uint8Array([0, 1, 1, 1]), new Uint32Array([0])];
+  const sewn = pile.vertexPairs(base, from, listed, top);
+  const named = await detector.near(pile, 1, { exclude: [sewn] });
+  const twice = pile.vertexPairs(top, new Uint16Array([0, 2, 2, 2]), new Uint32Array([0, 0]), base);
+  left.sewn = [sewn.length, twice.length, named.length > 0 && named.length < every, (await count(twice)) === named.length];
+  left.own = (await count(pile.vertexPairs(base, from, listed))) === every;
+  left.offsets = await refusal(() => count(pile.vertexPairs(base, new Uint8Array([0, 1, 1]), listed, top)));
+  left.noVertex = await refusal(() => count(pile.vertexPairs(base, from, new Uint32Array([7]), top)));
+  left.nobody = await refusal(() => pile.vertexPairs(base, from, listed, 99));
+  left.numbers = await refusal(() => pile.vertexPairs(base, [0, 1, 1, 1], listed));
+  sewn.dispose();
+  left.forgotten = await refusal(() => count(sewn));
   const whole = await detector.candidates(pile, 1);
   const [runs, lengths] = [[], []];
   const sum = await detector.candidatesInRuns(pile, 1, (run) => { runs.push(...run.rows); lengths.push(run.length); }, { most: 4 });
@@ -885,8 +898,8 @@ export const OTHERS = {
   left: {
     groups: [true, true],
     rest: [true, 0],
-    foreign: "invalid: exclude: pairs at rest given that are of another scene or disposed of, those of this scene allowed",
-    disposed: ["invalid: exclude: pairs at rest given that are of another scene or disposed of, those of this scene allowed", 0],
+    foreign: "invalid: exclude: pairs given that are of another scene or disposed of, those of this scene allowed",
+    disposed: ["invalid: exclude: pairs given that are of another scene or disposed of, those of this scene allowed", 0],
     one: "invalid: groups: 1 given, two groups are needed, without rings",
     both: "invalid: groups: 1,2 given, two groups are needed, without rings",
     group: "invalid: groups: -1 given, 0 to 4294967295 allowed",
@@ -894,6 +907,13 @@ export const OTHERS = {
     plain: "invalid: groups: an Array given, a Uint32Array, a Uint16Array or a Uint8Array is needed",
     short: "invalid: body 1: 2 groups given, but there are 3 vertices",
     distance: "invalid: distance: -1 given, a finite number that is not below 0 allowed",
+    sewn: [1, 2, true, true],
+    own: true,
+    offsets: "invalid: exclude: lists for the vertices of body 0, of vertices of body 1: 3 offsets, but body 0 has 3 vertices: one more is needed",
+    noVertex: "invalid: exclude: lists for the vertices of body 0, of vertices of body 1: vertex 7 at 0, but body 1 has 3 vertices",
+    nobody: "invalid: there is no body 99: 2 have been added, and 0 of them removed",
+    numbers: "invalid: offsets: an Array given, a Uint32Array, a Uint16Array or a Uint8Array is needed",
+    forgotten: "invalid: exclude: pairs given that are of another scene or disposed of, those of this scene allowed",
     runs: [true, true, true, 4],
     listed: true,
     stopped: 4,

@@ -94,7 +94,7 @@ impl Question {
 /// the precision (0 is the default of each), kinds as bits with 64 if they were said, flags (1
 /// distances, 2 nearest points, 4 a cell; from 8 on which hits of rays; from 32 on how many bodies
 /// are fixed), how many nearest elements, the fixed bodies, and three words for each exclusion: 0
-/// and two bodies, 1 and rings, 2 and two groups, 3 and the number of pairs at rest. `numbers`:
+/// and two bodies, 1 and rings, 2 and two groups, 3 and the number of pairs that the scene keeps. `numbers`:
 /// separation, clearance, its share, the low and the high corner of the cell, and the question's
 /// own length.
 ///
@@ -156,7 +156,7 @@ pub fn query(world: &World, words: &[u32], numbers: &[f64; 10]) -> Result<Query,
             0 => (id(a)?, id(b)?).into(),
             1 => Exclusion::rings(a),
             2 => Exclusion::groups(a, b),
-            _ => world.pairs_at_rest(a)?,
+            _ => world.pairs_of(a)?,
         });
     }
     Ok(query

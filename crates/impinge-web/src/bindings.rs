@@ -164,9 +164,22 @@ impl SceneHandle {
         self.0.keep_at_rest(number, distance).map_err(thrown)
     }
 
-    /// See [`World::forget_at_rest`].
-    pub fn forget_rest_pairs(&mut self, number: u32) {
-        self.0.forget_at_rest(number);
+    /// See [`World::keep_vertex_pairs`].
+    pub fn vertex_pairs(
+        &mut self,
+        number: u32,
+        a: u32,
+        b: u32,
+        offsets: &[u32],
+        vertices: &[u32],
+    ) -> Thrown<()> {
+        let kept = self.0.keep_vertex_pairs(number, [a, b], offsets, vertices);
+        kept.map_err(thrown)
+    }
+
+    /// See [`World::forget_pairs`].
+    pub fn forget_pairs(&mut self, number: u32) {
+        self.0.forget_pairs(number);
     }
 
     /// See [`World::set_element_thickness`].

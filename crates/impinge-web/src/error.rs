@@ -35,9 +35,9 @@ pub enum Error {
         /// Numbers in a row.
         row: usize,
     },
-    /// Pairs at rest that were asked for of another scene, or are forgotten.
+    /// Kept pairs that were asked for of another scene, or are forgotten.
     #[error(
-        "exclude: pairs at rest given that are of another scene or disposed of, those of this scene allowed"
+        "exclude: pairs given that are of another scene or disposed of, those of this scene allowed"
     )]
     PairsOfAnotherScene,
     /// A step that the other module has found.

@@ -35,8 +35,9 @@ pub struct World {
     pub(crate) scene: Scene,
     /// Ids by number; `None` once removed.
     ids: Vec<Option<BodyId>>,
-    /// Pairs that were near when the caller asked, by the caller's number.
-    at_rest: Vec<(u32, Exclusion)>,
+    /// Pairs that were near when the caller asked, or whose vertices the caller listed, by the
+    /// caller's number.
+    pairs: Vec<(u32, Exclusion)>,
 }
 
 impl World {
@@ -179,26 +180,45 @@ impl World {
     }
 
     /// Keeps the pairs that are within a distance now, by positions and thickness alone, under a
-    /// number, until they are [forgotten](Self::forget_at_rest). Returns how many there are.
+    /// number, until they are [forgotten](Self::forget_pairs). Returns how many there are.
     ///
     /// # Errors
     /// Those of [`Detector::near`].
     pub fn keep_at_rest(&mut self, number: u32, distance: f64) -> Result<u32, Error> {
         let mut detector = Detector::new(Backend::Cpu)?;
         let near = detector.near(&self.scene.at_rest(), distance, &Query::all())?;
-        self.at_rest.push((number, Exclusion::from(&near)));
+        self.pairs.push((number, Exclusion::from(&near)));
         // A module of 32 bits holds no more.
         Ok(near.len() as u32)
     }
 
-    /// Forgets the pairs at rest of a number, if they are kept.
-    pub fn forget_at_rest(&mut self, number: u32) {
-        self.at_rest.retain(|(of, _)| *of != number);
+    /// Keeps [listed pairs of vertices](Exclusion::vertices) of two bodies, or of one, under a
+    /// number.
+    ///
+    /// # Errors
+    /// No such body. Whether lists fit is checked when something is asked.
+    pub fn keep_vertex_pairs(
+        &mut self,
+        number: u32,
+        bodies: [u32; 2],
+        offsets: &[u32],
+        vertices: &[u32],
+    ) -> Result<(), Error> {
+        let [a, b] = [self.id(bodies[0])?, self.id(bodies[1])?];
+        let offsets: Vec<u64> = offsets.iter().map(|&offset| offset.into()).collect();
+        let pairs = Exclusion::vertices(a, b, offsets, vertices);
+        self.pairs.push((number, pairs));
+        Ok(())
     }
 
-    /// Pairs at rest by their number.
-    pub(crate) fn pairs_at_rest(&self, number: u32) -> Result<Exclusion, Error> {
-        let held = self.at_rest.iter().find(|(of, _)| *of == number);
+    /// Forgets the pairs of a number, if they are kept.
+    pub fn forget_pairs(&mut self, number: u32) {
+        self.pairs.retain(|(of, _)| *of != number);
+    }
+
+    /// Pairs by their number.
+    pub(crate) fn pairs_of(&self, number: u32) -> Result<Exclusion, Error> {
+        let held = self.pairs.iter().find(|(of, _)| *of == number);
         held.map(|(_, pairs)| pairs.clone())
             .ok_or(Error::PairsOfAnotherScene)
     }
