@@ -29,8 +29,8 @@ DAMPING = 0.99
 ITERATIONS = 20
 #: Compliance of edges, of diagonals and of bending, in metres per newton with vertices of one kilogram.
 STRETCH, SHEAR, BEND = 0.0, 1e-6, 1e-4
-#: Elements are pushed apart to this share of an edge, and looked for within that one.
-THICKNESS, REACH = 0.3, 0.5
+#: Elements are pushed apart to this share of an edge, and looked for within that one, with this margin for later steps.
+THICKNESS, REACH, MARGIN = 0.3, 0.5, 0.125
 #: Of a contact. Beside pinned vertices the sum of squares of weights may be tiny, and what it divides
 #: would move others by 10^11 metres.
 LEAST_MASS = 0.01
@@ -192,7 +192,7 @@ class World:
         for points, faces in self.fixed:
             self.scene.add(points, faces)
         self.others = [points.astype(np.float64) for points, _ in self.fixed]
-        self.detector = impinge.Detector("cpu")
+        self.detector = impinge.Detector("cpu", reuse_margin=MARGIN * self.cloth.edge)
         self.velocities = np.zeros_like(self.cloth.rest)
         self.n_steps = self.n_near = self.n_cut = 0
         self.seconds = {"near": 0.0, "solve": 0.0, "truncate": 0.0, "any": 0.0}

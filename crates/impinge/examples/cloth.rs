@@ -24,7 +24,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use impinge::{Backend, BodyId, Detector, PairKind, Positions, Query, Scene, Stencil};
+use impinge::{Backend, BodyId, Detector, PairKind, Positions, Query, Scene, Settings, Stencil};
 
 type Point = [f64; 3];
 type Surface = (Vec<Point>, Vec<[u32; 3]>);
@@ -42,6 +42,8 @@ const BEND: f64 = 1e-4;
 /// Elements are pushed apart to this share of an edge, and looked for within [`REACH`].
 const THICKNESS: f64 = 0.3;
 const REACH: f64 = 0.5;
+/// The share of an edge with which near pairs are listed, to be found again while little moves.
+const MARGIN: f64 = 0.125;
 /// Of a contact. Beside pinned vertices the sum of squares of weights may be tiny, and what it
 /// divides would move others by 10^11 metres.
 const LEAST_MASS: f64 = 0.01;
@@ -339,13 +341,14 @@ impl World {
         for (points, faces) in &fixed {
             scene.add_triangles(faces, &singles(points))?;
         }
+        let settings = Settings::from(Backend::Cpu).reuse_margin(MARGIN * cloth.edge);
         Ok(World {
             name,
             scene,
             pinned,
             body,
             fixed,
-            detector: Detector::new(Backend::Cpu)?,
+            detector: Detector::new(settings)?,
             velocities: vec![[0.0; 3]; cloth.rest.len()],
             cloth,
             n_steps: 0,
