@@ -198,8 +198,9 @@ class Scene(SceneBase):
             As many positions as the body has vertices. With ``copy=False``, a `numpy.ndarray` of float32 or float64 in C order,
             with ``vertices.flags.writeable`` False, and so for the array that it is a view of.
         copy : bool
-            Without a copy, the scene checks the array now and then reads it where it lies, until the body gets other positions or is
-            removed, or the scene is gone; it keeps the array alive. The array must not change before that. Arrays that can be written,
+            Without a copy, the scene reads the array where it lies, until the body gets other positions or is removed, or the scene is
+            gone; it keeps the array alive. Up to 4,096 positions are checked now, more of them by the next question, which then
+            says which is not finite. The array must not change before that. Arrays that can be written,
             and views of such, are refused. That is all that can be checked: whoever writes to the memory in another way, through a view
             made before or by making the array writeable again, gets answers about no one pose, and may read torn numbers.
 
@@ -238,7 +239,7 @@ class Scene(SceneBase):
         vertices : array_like, shape (v, 3), or None
             As many positions as the body has vertices. ``None``: the body stands still.
         copy : bool
-            As for `set_positions`. Where start and end come in different precisions, the single one is copied.
+            As for `set_positions`, but all are checked now. Where start and end come in different precisions, the single one is copied.
 
         Raises
         ------

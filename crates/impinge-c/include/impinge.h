@@ -150,8 +150,9 @@ impinge_status impinge_scene_set_positions(impinge_scene *scene, uint32_t body, 
  * impinge_scene_set_transform had moved before, until that moves it again. */
 impinge_status impinge_scene_set_end_positions(impinge_scene *scene, uint32_t body, impinge_array positions);
 
-/* Moves the vertices without a copy: the scene reads `positions` where they lie. They are checked in this call and not again, so they must
- * neither change nor move until `release` is called with `user`, which happens once: when the body gets other positions or is removed, when
+/* Moves the vertices without a copy: the scene reads `positions` where they lie. Up to 4,096 of them are checked in this call; more are
+ * read once, by the next question, which refuses them with INVALID if one is not finite. None is checked twice, so they must neither change
+ * nor move until `release` is called with `user`, which happens once: when the body gets other positions or is removed, when
  * the scene is destroyed, or when the last answer that needs them is; on whatever thread does that. `release` may be NULL and must not call
  * this library.
  * Nothing is copied if rows are packed (3 numbers of F32 or F64 without a gap). Other rows, such as columns of a column-major matrix, are
@@ -607,7 +608,7 @@ typedef struct impinge_stats {
 /* ---- Questions ----
  * All read the scene and change the detector. All may fail with any status: INVALID for a query that names no body of the scene, a
  * detector that is in use, or a scene that another call is changing; the others as the statuses say. After every failure but INTERNAL the
- * detector can be used again, and after INTERNAL if the message says that the scene is broken. Positions are checked when they are given or lent, and not by questions: answers about lent positions that have changed since mean nothing.
+ * detector can be used again, and after INTERNAL if the message says that the scene is broken. Positions are checked when they are given or, of many that are lent, by the first question: answers about lent positions that have changed since mean nothing.
  *
  * Near pairs, neighbours, safe distances, candidates and steps are about vertices, edges and faces: those of a body of triangles are its
  * faces with their edges and vertices, of tetrahedra the same of their surface, of edges these with their vertices. Other vertices, such as

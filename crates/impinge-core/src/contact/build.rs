@@ -251,6 +251,7 @@ impl<'a> ContactBodies<'a> {
             }
             if !body.is_checked() {
                 body.positions().check(id)?;
+                body.set_checked();
             }
             bodies.resize_with(bodies.len().max(id.index() + 1), || None);
             bodies[id.index()] = Some(Taking {

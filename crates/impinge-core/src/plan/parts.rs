@@ -7,7 +7,7 @@ use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{Number, PartIx};
-use crate::scene::positions::{Positions, Real, check_positions};
+use crate::scene::positions::{Positions, Real};
 use crate::scene::{Filter, Scene};
 use crate::workers::Workers;
 use crate::workers::alone::is_alone;
@@ -67,7 +67,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Refuses positions that were written in place and are not finite or out of range. All threads
+    /// Refuses positions that were not checked when they were given and are not finite. All threads
     /// read those of a large body.
     pub fn check(&self, scene: &Scene, workers: &Workers) -> Result<(), Error> {
         self.part_ixs().try_for_each(|part| {
@@ -81,6 +81,7 @@ impl Plan {
                     }
                 });
                 if !is_bad.into_inner() {
+                    body.set_checked();
                     return Ok(());
                 }
             }
@@ -95,11 +96,9 @@ impl Plan {
         if body.is_checked() {
             return Ok(());
         }
-        let id = self.part(part).id;
-        match body.positions() {
-            Positions::F32(positions) => check_positions(id, positions),
-            Positions::F64(positions) => check_positions(id, positions),
-        }
+        body.positions().check(self.part(part).id)?;
+        body.set_checked();
+        Ok(())
     }
 
     fn push(

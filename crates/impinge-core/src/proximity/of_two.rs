@@ -15,7 +15,6 @@ use crate::scene::elements::Part;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::ElementIx;
-use crate::scene::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
 use crate::search::stats::Stats;
 use crate::search::work::Work;
@@ -175,10 +174,8 @@ impl OfTwo {
     ) -> Result<(), Error> {
         let body = scene.body(id)?;
         if !body.is_checked() {
-            match body.positions() {
-                Positions::F32(positions) => check_positions(id, positions)?,
-                Positions::F64(positions) => check_positions(id, positions)?,
-            }
+            body.positions().check(id)?;
+            body.set_checked();
         }
         let body_part = BodyPart::new(id, body, part);
         let (slot, stats) = (id.index(), &mut self.stats);

@@ -12,14 +12,16 @@ use crate::scene::positions::{Given, NewPositions, Positions, Real};
 use crate::scene::transform::{Affine, RestPose};
 
 impl Scene {
-    /// Moves the vertices: `(v, 3)` positions, as many as the body has vertices, and checked now.
-    /// The precision may differ from frame to frame. A new step starts: the body stands still until
+    /// Moves the vertices: `(v, 3)` positions, as many as the body has vertices, and finite. The
+    /// precision may differ from frame to frame. A new step starts: the body stands still until
     /// its end positions are [set](Scene::set_end_positions).
     ///
     /// A slice, and a reference to a `Vec`, an array or [`Positions`], is copied. A `Vec` and
     /// `Positions` are taken over, and an `Arc` of something that has rows is shared, without a
     /// copy: the body drops it when it gets other positions or is removed. Two shared arrays serve
     /// a simulation: write the one that the scene has dropped, give it, and go on with the other.
+    /// What is copied is checked now, and so are up to 4,096 positions that are not. More of them are
+    /// read once, by the next question, whose error names a bad vertex.
     ///
     /// ```
     /// use std::sync::Arc;
@@ -49,9 +51,9 @@ impl Scene {
     ) -> Result<(), Error> {
         let positions = positions.into();
         let target = self.moved_body(body)?;
-        target.check(body, &positions)?;
+        let is_checked = target.check_now(body, &positions)?;
         store(&mut target.positions, positions);
-        target.has_moved(true);
+        target.has_moved(is_checked);
         Ok(())
     }
 
@@ -138,7 +140,7 @@ impl Scene {
     pub fn set_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
         let matrix = Affine::new(matrix)?;
         let target = self.moved_body(body)?;
-        if !target.checked {
+        if !target.is_checked() {
             target.positions.check(body)?;
         }
         matrix.check(body, target.rest_positions())?;
@@ -207,7 +209,7 @@ impl Scene {
     pub fn set_end_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
         let matrix = Affine::new(matrix)?;
         let target = self.moved_body(body)?;
-        if !target.checked {
+        if !target.is_checked() {
             target.positions.check(body)?;
         }
         matrix.check(body, target.rest_positions())?;

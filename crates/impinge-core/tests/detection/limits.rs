@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex};
 
 use crate::common::{self, agree, naive, rows};
 use impinge_core::{
-    Backend, CancelToken, Control, Detector, Error, Method, Query, Scene, Settings, SharedVertex,
+    Backend, BodyId, CancelToken, Control, Detector, Error, Method, Query, Scene, Settings,
+    SharedVertex,
 };
 use impinge_scenes::{adversarial, surfaces};
 
@@ -188,6 +189,103 @@ fn the_first_bad_position_of_a_large_body_is_named() {
         }
         detector.detect(&scene, &query).unwrap();
     }
+}
+
+/// Asks, and drops the answer.
+type Ask = fn(&mut Detector, &Scene, [BodyId; 2]) -> Result<(), Error>;
+
+#[test]
+fn many_positions_that_are_not_copied_are_checked_by_the_next_question() {
+    let asks: [(&str, Ask); 16] = [
+        ("detect", |d, s, _| d.detect(s, &Query::all()).map(drop)),
+        ("count", |d, s, _| d.count(s, &Query::all()).map(drop)),
+        ("any", |d, s, _| d.any(s, &Query::all()).map(drop)),
+        ("near", |d, s, _| d.near(s, 0.01, &Query::all()).map(drop)),
+        ("neighbours", |d, s, _| {
+            d.neighbours(s, 0.01, &Query::all()).map(drop)
+        }),
+        ("safe", |d, s, _| {
+            d.safe_distances(s, 0.01, &Query::all()).map(drop)
+        }),
+        ("distance", |d, s, [a, b]| d.distance(s, a, b).map(drop)),
+        ("nearest", |d, s, _| {
+            d.nearest(s, &Query::between_all()).map(drop)
+        }),
+        ("contains", |d, s, [a, _]| {
+            d.contains(s, a, &[[0.0; 3]]).map(drop)
+        }),
+        ("closest", |d, s, _| {
+            d.closest(s, &[[0.0; 3]], 9.0, &Query::all()).map(drop)
+        }),
+        ("cast", |d, s, _| {
+            d.cast(s, &[[0.0; 3]], &[[1.0; 3]], 9.0, &Query::all())
+                .map(drop)
+        }),
+        ("impacts", |d, s, _| d.impacts(s, &Query::all()).map(drop)),
+        ("is_free", |d, s, _| d.is_free(s, &Query::all()).map(drop)),
+        ("advance", |d, s, _| d.advance(s, &Query::all()).map(drop)),
+        ("truncate", |d, s, _| d.truncate(s, &Query::all()).map(drop)),
+        ("candidates", |d, s, _| {
+            d.candidates(s, 0.0, &Query::all()).map(drop)
+        }),
+    ];
+    let ball = surfaces::ball(10_000);
+    let aside = ball.clone().translated([0.0, 0.0, 3.0]);
+    let mut scene = Scene::new();
+    let [a, b] = [&ball, &aside].map(|model| model.add_to(&mut scene).unwrap());
+    let mut bad = aside.positions.clone();
+    let last = bad.len() - 1;
+    assert!(last > 4096);
+    bad[last][1] = f32::NAN;
+    for threads in [1, 2] {
+        let mut detector = Detector::new(cpu(Method::Auto).threads(threads)).unwrap();
+        for (name, ask) in &asks {
+            for shared in [false, true] {
+                match shared {
+                    true => scene.set_positions(b, Arc::new(bad.clone())).unwrap(),
+                    false => scene.set_positions(b, bad.clone()).unwrap(),
+                }
+                for _ in 0..2 {
+                    match ask(&mut detector, &scene, [b, a]) {
+                        Err(Error::NonFinitePosition { body, vertex, .. }) => {
+                            assert_eq!((body, vertex), (b, last), "{name}");
+                        }
+                        other => panic!("{name}: {other:?}"),
+                    }
+                }
+                scene.set_positions(b, aside.positions.clone()).unwrap();
+                for _ in 0..2 {
+                    ask(&mut detector, &scene, [b, a]).unwrap();
+                }
+            }
+        }
+    }
+    // What is copied is refused at once, and so are few positions: nothing has changed then.
+    assert!(scene.set_positions(b, &bad).is_err());
+    assert_eq!(
+        scene.body(b).unwrap().positions().point(last)[1],
+        f64::from(aside.positions[last][1])
+    );
+    let few = scene.add_triangles(&[[0, 1, 2]], &TRIANGLE).unwrap();
+    let nowhere = vec![[f32::NAN; 3]; 3];
+    assert!(matches!(
+        scene.set_positions(few, nowhere),
+        Err(Error::NonFinitePosition { vertex: 0, .. })
+    ));
+    assert!(matches!(
+        scene.set_positions(b, vec![[0.0f32; 3]; last]),
+        Err(Error::WrongNumberOfPositions { .. })
+    ));
+    // Ends are checked when they are given; transforms look at what they move.
+    assert!(scene.set_end_positions(b, bad.clone()).is_err());
+    scene.set_positions(b, bad).unwrap();
+    let still = [
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+    assert!(scene.set_transform(b, &still).is_err() && scene.set_end_transform(b, &still).is_err());
 }
 
 #[test]

@@ -109,6 +109,7 @@ impl NearIter<'_> {
         for (id, body) in scene.bodies() {
             if !body.is_checked() {
                 body.positions().check(id)?;
+                body.set_checked();
             }
         }
         let (n, threads) = (self.len(), self.threads());
