@@ -6,7 +6,6 @@
 
 use impinge::wgpu::{self, util::DeviceExt};
 use impinge::{Detector, Query, Scene, Settings};
-use impinge_scenes::surfaces;
 
 const FRAMES: u32 = 60;
 /// Frames before the clock counts.
@@ -101,17 +100,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (device, queue) = pollster::block_on(adapter.request_device(&Default::default()))?;
     println!("on {}", adapter.get_info().name);
 
-    // Two balls: one deforms on the device and sinks into the other, which does not move.
-    let ball = surfaces::ball(20_000);
+    // Two tori: one deforms on the device and sinks into the other, which does not move.
+    let (faces, points) = torus(100);
     let mut scene = Scene::new();
-    let moving = ball.add_to(&mut scene)?;
-    let resting = ball.add_to(&mut scene)?;
+    let moving = scene.add_triangles(&faces, &points)?;
+    let resting = scene.add_triangles(&faces, &points)?;
     let query = Query::between(moving, resting);
     let mut detector = Detector::new(Settings::new().on_device(device.clone(), queue.clone()))?;
     let mut gpu = detector.gpu().expect("it has one");
 
-    let words: Vec<u8> = ball
-        .positions
+    let words: Vec<u8> = points
         .iter()
         .flatten()
         .flat_map(|x| x.to_le_bytes())
@@ -139,7 +137,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST,
     );
     let time = buffer("time", &[0; 16], Usage::UNIFORM | Usage::COPY_DST);
-    let n_elements = 2 * ball.n_elements();
+    let n_elements = 2 * faces.len();
     let is_hit = buffer(
         "is hit",
         &vec![0; 4 * n_elements],
@@ -165,7 +163,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             &mut encoder,
             &deform,
             &deform_group,
-            ball.n_vertices().div_ceil(64),
+            points.len().div_ceil(64),
         );
         let found = gpu.encode(&scene, &query, &[(moving, &positions)], &mut encoder)?;
         let words = [found.n_pairs_offset / 4, found.n_unsure_offset / 4, 0, 0];
@@ -239,6 +237,29 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         f32::from_bits(may_touch[3])
     );
     Ok(())
+}
+
+/// Triangles and vertices of a torus around the z axis: `n` rings of `n` vertices.
+fn torus(n: u32) -> (Vec<[u32; 3]>, Vec<[f32; 3]>) {
+    let turn = |k: u32| std::f32::consts::TAU * k as f32 / n as f32;
+    let vertex = |k: u32| {
+        let (around, across) = (turn(k / n), turn(k % n));
+        let radius = 0.35 + 0.15 * across.cos();
+        [
+            radius * around.cos(),
+            radius * around.sin(),
+            0.15 * across.sin(),
+        ]
+    };
+    let square = |k: u32| {
+        let corner = |i, j| (k / n + i) % n * n + (k + j) % n;
+        let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    (
+        (0..n * n).flat_map(square).collect(),
+        (0..n * n).map(vertex).collect(),
+    )
 }
 
 fn pipeline(device: &wgpu::Device, shader: &str) -> wgpu::ComputePipeline {
