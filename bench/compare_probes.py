@@ -14,7 +14,7 @@ is what new positions cost, also per point or ray: `set_positions` and the refit
 refit happens in the question; a question about one point shows it. The first frame is a table of its own: there clusters are made. trimesh's nearest faces are asked of a few points only.
 
 Answers are compared with those of impinge, which are exact: where a point lies; whether a ray hits; how far the nearest face is, to a
-relative 1e-5. What differs is counted, not decided: `crates/impinge-core/tests/probe` decides against rational arithmetic.
+relative 1e-5. What differs is counted, not decided: `crates/tests/tests/probe` decides against rational arithmetic.
 """
 
 import argparse

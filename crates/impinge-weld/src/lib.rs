@@ -20,7 +20,7 @@ use std::hash::{BuildHasher, Hash, Hasher, RandomState};
 ///
 /// ```
 /// use impinge::Weld;
-/// # fn main() -> Result<(), impinge::Error> {
+/// # fn main() -> Result<(), impinge::WrongNumber> {
 /// let positions = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, -0.0], [1.0, 1.0, 0.0]];
 /// let faces = [[0, 1, 2], [3, 5, 4]];
 /// let weld = Weld::by_position(&positions);

@@ -2,8 +2,12 @@
 //!
 //! * [`data`]: locations of real meshes and published answers.
 //! * [`published`]: pairs of triangles with published answers.
+//! * [`random`]: random numbers for tests of crates that `impinge-scenes` stands on.
 //! * [`schema`]: `docs/*.schema.json`, made from types.
 
 pub mod data;
 pub mod published;
+// One source for both: a crate that is published cannot import this one.
+#[path = "../../impinge-scenes/src/random.rs"]
+pub mod random;
 pub mod schema;

@@ -301,7 +301,7 @@ mod tests {
     /// A stage that gives a result agrees with integers, and it mostly gives one.
     #[test]
     fn stages_agree() {
-        let mut random = impinge_scenes::Random::new(7);
+        let mut random = impinge_testing::random::Random::new(7);
         let mut sure = [0usize; 2];
         let mut n = 0usize;
         for round in 0..6_000 {

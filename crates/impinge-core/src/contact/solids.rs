@@ -133,7 +133,7 @@ fn prism(low: [Point; 3], high: [Point; 3], out: &mut Vec<[Point; 4]>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use impinge_scenes::Random;
+    use impinge_testing::random::Random;
 
     const CORNER: [[f64; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 

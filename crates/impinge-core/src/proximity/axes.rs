@@ -128,7 +128,7 @@ impl TurnedBoxes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use impinge_scenes::Random;
+    use impinge_testing::random::Random;
 
     fn squared(p: Point, q: Point) -> f64 {
         let d = [0, 1, 2].map(|k| p[k] - q[k]);

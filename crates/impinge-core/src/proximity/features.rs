@@ -184,7 +184,7 @@ pub(super) fn gap(a: &[Point], b: &[Point]) -> Gap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use impinge_scenes::Random;
+    use impinge_testing::random::Random;
 
     /// The least distance of two triangles by numerical minimisation: never less than the true
     /// distance.

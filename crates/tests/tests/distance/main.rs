@@ -1,0 +1,10 @@
+//! What is near, how near, and how far it may go.
+
+mod near;
+mod reuse;
+mod safe;
+mod separation;
+mod smallest;
+mod stencils;
+mod thickness;
+mod truncate;
