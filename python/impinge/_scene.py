@@ -199,7 +199,7 @@ class Scene(SceneBase):
             with ``vertices.flags.writeable`` False, and so for the array that it is a view of.
         copy : bool
             Without a copy, the scene reads the array where it lies, until the body gets other positions or is removed, or the scene is
-            gone; it keeps the array alive. Up to 4,096 positions are checked now, more of them by the next question, which then
+            gone; it keeps the array alive. Up to 32,768 positions are checked now, more of them by the next question, which then
             says which is not finite. The array must not change before that. Arrays that can be written,
             and views of such, are refused. That is all that can be checked: whoever writes to the memory in another way, through a view
             made before or by making the array writeable again, gets answers about no one pose, and may read torn numbers.

@@ -150,7 +150,7 @@ impinge_status impinge_scene_set_positions(impinge_scene *scene, uint32_t body, 
  * impinge_scene_set_transform had moved before, until that moves it again. */
 impinge_status impinge_scene_set_end_positions(impinge_scene *scene, uint32_t body, impinge_array positions);
 
-/* Moves the vertices without a copy: the scene reads `positions` where they lie. Up to 4,096 of them are checked in this call; more are
+/* Moves the vertices without a copy: the scene reads `positions` where they lie. Up to 32,768 of them are checked in this call; more are
  * read once, by the next question, which refuses them with INVALID if one is not finite. None is checked twice, so they must neither change
  * nor move until `release` is called with `user`, which happens once: when the body gets other positions or is removed, when
  * the scene is destroyed, or when the last answer that needs them is; on whatever thread does that. `release` may be NULL and must not call

@@ -484,7 +484,7 @@ public:
   }
   /// The body stands still.
   result<void> clear_end_positions(body of) { return detail::give(impinge_scene_set_end_positions(raw(), of, array{nullptr, 0, 0, 0, IMPINGE_F64})); }
-  /// Positions that the scene reads where they lie, and shares the owner of. Up to 4,096 are checked in
+  /// Positions that the scene reads where they lie, and shares the owner of. Up to 32,768 are checked in
   /// this call, more by the next question; they must not change.
   template <class P> result<void> lend_positions(body of, std::shared_ptr<P> owner) { return lend(impinge_scene_lend_positions, of, std::move(owner)); }
   template <class P> result<void> lend_end_positions(body of, std::shared_ptr<P> owner) {

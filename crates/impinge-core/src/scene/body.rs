@@ -334,7 +334,7 @@ impl Body {
         body: BodyId,
         positions: &NewPositions<'_>,
     ) -> Result<bool, Error> {
-        const FEW: usize = 1 << 12;
+        const FEW: usize = 1 << 15;
         if matches!(positions.0, Given::Whole(_)) && positions.len() > FEW {
             self.check_number(body, positions.len())?;
             return Ok(false);

@@ -20,7 +20,7 @@ impl Scene {
     /// `Positions` are taken over, and an `Arc` of something that has rows is shared, without a
     /// copy: the body drops it when it gets other positions or is removed. Two shared arrays serve
     /// a simulation: write the one that the scene has dropped, give it, and go on with the other.
-    /// What is copied is checked now, and so are up to 4,096 positions that are not. More of them are
+    /// What is copied is checked now, and so are up to 32,768 positions that are not. More of them are
     /// read once, by the next question, whose error names a bad vertex.
     ///
     /// ```
