@@ -1279,8 +1279,15 @@ class Truncation(_Motion):
 
     @property
     def rounds(self) -> int:
-        """int : how often pairs were looked at again, because vertices had been stopped."""
+        """int : how often pairs were looked at again, because vertices had been stopped; at most 256 times."""
         return self._inner.rounds
+
+    @property
+    def pairs(self) -> Candidates:
+        """Candidates : the pairs that stopped vertices, those that touch at the start included. Sorted anew each time, so that it costs
+        nothing where nobody asks.
+        """
+        return Candidates(self._inner.pairs())
 
     def __repr__(self) -> str:
         return f"Truncation(n_cut={self.n_cut}, {len(self.bodies)} bodies)"

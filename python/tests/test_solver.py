@@ -56,6 +56,11 @@ def test_each_vertex_goes_as_far_as_it_can(scene, detector):
     assert 0 < truncation.n_cut < len(at) and truncation.rounds >= 1
     assert (moved >= 0).all() and moved.max() > 0.2999 and moved.min() < 0.2
     assert detector.advance(scene).fraction * 0.3 < moved.max()
+    pairs = truncation.pairs
+    impacts = detector.impacts(scene)
+    met = {(kind, *row) for kind, row in zip(impacts.kinds.tolist(), impacts.rows.tolist(), strict=True)}
+    assert met <= {(kind, *row) for kind, row in zip(pairs.kinds.tolist(), pairs.rows.tolist(), strict=True)}
+    assert len(met) > 0 and len(pairs.of("vf")) + len(pairs.of("ee")) == len(pairs)
     assert f"n_cut={truncation.n_cut}" in repr(truncation)
     with pytest.raises(TypeError, match="pickle its arrays"):
         pickle.dumps(truncation)

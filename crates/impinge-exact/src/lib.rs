@@ -85,8 +85,8 @@ pub mod internal {
         Approach, Keep, NearestOfElements, PairAtPart, Reach, approach, are_within_certainly,
         closest_by_part, closest_of_elements, compare_point_distances, distance_under,
         elements_are_within, elements_meet, gap_below, gap_by_bounds, nearest_of_elements,
-        nearest_part_of_element, paired, point_distance_bounds, shares_apart, shares_without_room,
-        unsure_are_within,
+        nearest_part_of_element, paired, point_distance_bounds, shares_apart, shares_at_rest,
+        shares_without_room, unsure_are_within,
     };
     pub use crate::orientation::{Projection, collinear};
     pub use crate::ray::{Meeting, Parameter, Ray, meet, meet_inside};

@@ -431,6 +431,10 @@ impl Truncation {
         self.inner.rounds()
     }
 
+    fn pairs(&self, py: Python<'_>) -> Candidates {
+        Candidates::new(py.detach(|| self.inner.pairs()))
+    }
+
     #[getter]
     fn start_intersects(&self) -> Option<bool> {
         self.inner.start_intersects()

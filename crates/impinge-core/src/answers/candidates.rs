@@ -8,7 +8,7 @@ use crate::query::pair_kind::PairKind;
 use crate::scene::error::Error;
 #[cfg(doc)]
 use crate::scene::ids::BodyId;
-use crate::search::found::KeysByKind;
+use crate::search::found::{KeysByKind, PairList};
 use crate::search::runner::{Job, Outcome};
 use crate::search::stats::Stats;
 
@@ -39,6 +39,27 @@ impl Candidates {
     /// Gives it memory for the keys of the next answer.
     pub(crate) fn put_buffers(&mut self, rooms: KeysByKind) {
         self.keys = rooms;
+    }
+
+    /// Pairs in any order, each once or more often.
+    pub(crate) fn of_pairs(numbering: Numbering, pairs: &PairList) -> Self {
+        let mut keys = KeysByKind::default();
+        for &(kind, key) in pairs {
+            keys[kind as usize].push(key);
+        }
+        for keys in &mut keys {
+            keys.sort_unstable();
+            keys.dedup();
+        }
+        let mut candidates = Candidates::default();
+        (candidates.numbering, candidates.keys) = (numbering, keys);
+        candidates
+    }
+
+    /// The keys of each kind, sorted.
+    pub(crate) fn keys(&self) -> impl Iterator<Item = (PairKind, &[u64])> {
+        let keys = self.keys.iter().map(Vec::as_slice);
+        PairKind::ALL.into_iter().zip(keys)
     }
 
     /// The number of candidates of all kinds.

@@ -1,10 +1,13 @@
 //! How far each vertex may go in a step, and where it is afterwards.
 
+use crate::answers::candidates::Candidates;
+use crate::answers::numbering::Numbering;
 use crate::answers::reached::{Reached, StepStart};
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Positions;
+use crate::search::found::PairList;
 
 /// Where the vertices are after each has gone as far as it may: see
 /// [`Detector::truncate`](crate::Detector::truncate).
@@ -16,7 +19,24 @@ pub struct Truncation {
     pub(crate) n_cut: u64,
     pub(crate) n_touching: u64,
     pub(crate) n_rounds: u32,
+    pub(crate) stopped: Stopped,
     pub(crate) start_intersects: Option<bool>,
+}
+
+/// The pairs that stopped vertices.
+#[derive(Clone, Default)]
+pub(crate) struct Stopped {
+    pub numbering: Numbering,
+    /// In any order, and some of them more than once.
+    pub pairs: PairList,
+}
+
+impl PartialEq for Stopped {
+    fn eq(&self, other: &Self) -> bool {
+        let [own, others] =
+            [self, other].map(|of| Candidates::of_pairs(of.numbering.clone(), &of.pairs));
+        own.iter().eq(others.iter())
+    }
 }
 
 impl Truncation {
@@ -42,9 +62,17 @@ impl Truncation {
         self.n_touching
     }
 
-    /// How often pairs were looked at again, because vertices had been stopped.
+    /// How often pairs were looked at again, because vertices had been stopped; at most 256
+    /// times.
     pub fn rounds(&self) -> u32 {
         self.n_rounds
+    }
+
+    /// The pairs that stopped vertices, those that touch at the start included, sorted by
+    /// `(kind, body_a, element_a, body_b, element_b)`. Sorted anew each time.
+    pub fn pairs(&self) -> Candidates {
+        let Stopped { numbering, pairs } = &self.stopped;
+        Candidates::of_pairs(numbering.clone(), pairs)
     }
 
     /// Whether elements intersect at the start; no vertex was moved then. `None` if nobody asked:

@@ -24,6 +24,10 @@ use crate::search::key_ranges::{KeyRanges, Run, Tally};
 use crate::search::runner::{Runner, ready};
 use crate::search::sink::{self, BLOCK};
 use crate::search::stats::Stats;
+use crate::search::work::Work;
+
+/// Pairs per run of a step that is taken apart.
+const RUN: u64 = 1 << 22;
 
 /// A search for candidates, run by run.
 struct RunSearch<'a> {
@@ -111,16 +115,31 @@ impl Detector {
         let control = &self.control.clone();
         check_most(most)?;
         let limits = self.settings.limits();
-        let at_once = Limits {
-            max_pairs: Some(most.min(limits.max_pairs.unwrap_or(most))),
-            ..limits
-        };
-        let plan = Plan::candidates(scene, inflation, query, at_once)?;
-        let candidates = &mut self.homes.candidates.take();
+        let plan = Plan::candidates(scene, inflation, query, limits_at_once(limits, most))?;
         let mut search = self.search(scene, &plan, control);
-        match search.find_at_once(candidates, limits, &mut each)? {
-            Some(flow) => Ok(flow),
-            None => search.find_in_runs(candidates, plan.kinds_asked(), (limits, most), &mut each),
+        search.find_all((limits, most), &mut each)
+    }
+
+    /// Calls a function with runs of pairs whose boxes overlap, about which a plan asks; however
+    /// many there are.
+    pub(super) fn each_overlap(
+        &mut self,
+        (scene, plan): (&Scene, &Plan),
+        mut each: impl FnMut(Candidates, Work<'_>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let control = &self.control.clone();
+        let limits = self.limits_of_steps();
+        let plan = plan.overlapping(scene, limits_at_once(limits, RUN));
+        let mut search = self.search(scene, &plan, control);
+        let workers = search.runner.workers();
+        let work = Work { workers, control };
+        let mut hand_over = |run| match each(run, work) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => ControlFlow::Break(error),
+        };
+        match search.find_all((limits, RUN), &mut hand_over)? {
+            ControlFlow::Continue(_) => Ok(()),
+            ControlFlow::Break(error) => Err(error),
         }
     }
 
@@ -150,7 +169,28 @@ impl Detector {
     }
 }
 
+/// The limits of an answer that is found at once, if it is no longer than a run.
+fn limits_at_once(limits: Limits, most: u64) -> Limits {
+    Limits {
+        max_pairs: Some(most.min(limits.max_pairs.unwrap_or(most))),
+        ..limits
+    }
+}
+
 impl RunSearch<'_> {
+    /// Finds all candidates, at once or in runs of at most so many.
+    fn find_all<B>(
+        &mut self,
+        (limits, most): (Limits, u64),
+        each: &mut impl FnMut(Candidates) -> ControlFlow<B>,
+    ) -> Result<ControlFlow<B, u64>, Error> {
+        let candidates = &mut self.home.take();
+        match self.find_at_once(candidates, limits, each)? {
+            Some(flow) => Ok(flow),
+            None => self.find_in_runs(candidates, self.plan.kinds_asked(), (limits, most), each),
+        }
+    }
+
     /// Finds some of the candidates, or counts them. Returns how many were found.
     fn find<'b>(
         &'b mut self,

@@ -4,11 +4,15 @@
 //! contacts     pairs that touch on the ways to where the vertices are now: as for all impacts
 //! they stop    the vertices that go towards the other element, before planes between the two
 //! again        for pairs of which a vertex was stopped since, until none touches
+//! at rest      after 255 rounds: planes that are good for any shares, for all that something
+//!              still reaches (`at_rest`)
 //! ```
 //!
 //! Where the vertices are now is always rounded as it is stored, so what is asked last is the
 //! proof. In each round all pairs see the same positions, and of several shares of a way the least
 //! counts: the order does not matter.
+
+mod at_rest;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -21,11 +25,12 @@ use crate::query::Query;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
+use crate::scene::index::{ElementIx, PartIx};
 use crate::scene::positions::Positions;
 use crate::search::found::PairList;
 use crate::search::moved::Moved;
 use crate::search::narrow::exact_kind;
-use crate::search::sink::{filled, reserve};
+use crate::search::sink::{filled, grow, reserve};
 use crate::search::stats::Stats;
 use crate::search::work::Work;
 use crate::workers::clock::Instant;
@@ -50,7 +55,10 @@ impl Detector {
     /// only one of them comes nearer, it gets all of the room but a thousandth, and if both do,
     /// each gets a share of it, by how far it wants to go. Then pairs of which a vertex was stopped
     /// are looked at again, until none meets. So some vertices stop that might have passed; the
-    /// next step takes them farther. A body whose end a
+    /// next step takes them farther. Where each element stops the next one, as in a pile of rigid
+    /// bodies, there is a round for each. After 255 rounds, those that may still meet, directly or
+    /// through others, get planes that rest, for all of their pairs: that is the last round, and
+    /// takes them no farther than to what was next to them at the start. A body whose end a
     /// [transform](Scene::set_end_transform) made stops as a whole: all of its vertices go the least
     /// share of their ways that one of them may go.
     ///
@@ -113,12 +121,27 @@ impl Detector {
             self.find_contacts_of((&now, &plan), (!is_first).then_some(moved))?;
             stats.add(&self.stats);
             let stops = Instant::now();
-            let touching = self.stop(&vertices, (scene, &plan))?;
+            let StoppingPairs { touching, meeting } = if truncation.n_rounds == MOST_ROUNDS {
+                StoppingPairs {
+                    meeting: self.part(&mut vertices, scene, (&now, &plan))?,
+                    ..StoppingPairs::default()
+                }
+            } else {
+                self.stop(&vertices, (scene, &plan))?
+            };
             if is_first {
                 // All that touch at the start are known now.
                 refuse_seams(scene, &plan, touching.iter().copied())?;
                 truncation.n_touching = touching.len() as u64;
+                truncation.stopped.numbering.begin(&plan);
             }
+            let pairs = &mut truncation.stopped.pairs;
+            grow(
+                pairs,
+                touching.len() + meeting.len(),
+                "pairs that stopped vertices",
+            )?;
+            pairs.extend(touching.into_iter().chain(meeting));
             let any = vertices.go_back(scene);
             stats.add_ms("stops", stops.elapsed().as_secs_f64() * 1e3);
             if !any {
@@ -135,12 +158,16 @@ impl Detector {
         Ok(truncation)
     }
 
-    /// Stops the vertices of all pairs that touch. Returns those of which no vertex may move: they
-    /// touch at the start.
+    /// Stops the vertices of all pairs that touch. Returns those pairs, but for pairs of which no
+    /// vertex moves.
     ///
     /// # Errors
     /// Cancellation.
-    fn stop(&self, vertices: &Vertices, (scene, plan): (&Scene, &Plan)) -> Result<PairList, Error> {
+    fn stop(
+        &self,
+        vertices: &Vertices,
+        (scene, plan): (&Scene, &Plan),
+    ) -> Result<StoppingPairs, Error> {
         let workers = self.runner.workers();
         let mut tasks = Vec::new();
         for (kind, found) in self.steps.contacts.lists() {
@@ -149,26 +176,43 @@ impl Detector {
                 continue;
             };
             let chunks = found.chunks(workers.task(TASK));
-            tasks.extend(chunks.map(|found| (kind, pair, found, Vec::new())));
+            tasks.extend(chunks.map(|found| (kind, pair, found, StoppingPairs::default())));
         }
         let work = Work {
             workers,
             control: &self.control,
         };
-        work.each(&mut tasks, |_, (kind, pair, found, touching)| {
-            let stay = found.iter().filter(|found| {
+        work.each(&mut tasks, |_, (kind, pair, found, stopping)| {
+            for found in *found {
                 let is_touching = found.value.at_start;
-                vertices.stop(*pair, (found.key, is_touching), (scene, plan))
-            });
-            touching.extend(stay.map(|found| (*kind, found.key)));
+                if vertices.stop((*pair, found.key), is_touching, (scene, plan)) {
+                    let list = match is_touching {
+                        true => &mut stopping.touching,
+                        false => &mut stopping.meeting,
+                    };
+                    list.push((*kind, found.key));
+                }
+            }
             Ok(())
         })?;
-        Ok(tasks
-            .into_iter()
-            .flat_map(|(.., touching)| touching)
-            .collect())
+        let mut all = StoppingPairs::default();
+        for (.., own) in tasks {
+            all.touching.extend(own.touching);
+            all.meeting.extend(own.meeting);
+        }
+        Ok(all)
     }
 }
+
+/// The pairs that stop vertices in a round: those that touch at the start, and all others.
+#[derive(Default)]
+struct StoppingPairs {
+    touching: PairList,
+    meeting: PairList,
+}
+
+/// A pair by its test and its key.
+type Pair = (ElementPair, u64);
 
 /// How far each vertex of each body goes.
 struct Vertices {
@@ -195,6 +239,9 @@ struct Vertex {
 
 /// A vertex that was stopped so often stays at its start: rounds end.
 const MOST_STOPS: u8 = 60;
+
+/// So many rounds look only at pairs that meet. One more may follow, see [`at_rest`].
+const MOST_ROUNDS: u32 = 255;
 
 impl Vertices {
     /// All go to their ends.
@@ -324,24 +371,47 @@ fn n_ways((_, start, end): (BodyId, &Positions, &Positions)) -> u64 {
 /// The bits of 1: all of a way.
 const WHOLE: u64 = 1.0_f64.to_bits();
 
+/// The points of a pair, as the exact tests take them.
+struct PairPoints {
+    n: usize,
+    /// The number of each vertex; the first again, where there are fewer.
+    own: [usize; 4],
+    start: [Point; 4],
+    now: [Point; 4],
+    end: [Point; 4],
+}
+
+impl PairPoints {
+    /// The places of those that move.
+    fn moving(&self) -> impl Iterator<Item = usize> {
+        (0..self.n).filter(|&ix| self.now[ix] != self.start[ix])
+    }
+
+    /// At the start, now, and at the end.
+    fn times(&self) -> [&[Point; 4]; 3] {
+        [&self.start, &self.now, &self.end]
+    }
+}
+
+/// The elements of a pair, in the order of the exact tests.
+fn located(plan: &Plan, pair: ElementPair, key: u64) -> [(PartIx, ElementIx); 2] {
+    let mut located = plan.located(key);
+    if pair == ElementPair::VertexEdge {
+        // Such pairs are named edge first, but tested vertex first.
+        located.reverse();
+    }
+    located
+}
+
 impl Vertices {
-    /// Stops the vertices of a pair that go towards the other element, or all of them if it touches
-    /// at the start. Returns whether there are any of a pair that does.
-    fn stop(
+    fn points(
         &self,
-        pair: ElementPair,
-        (key, is_touching): (u64, bool),
+        located: &[(PartIx, ElementIx); 2],
         (scene, plan): (&Scene, &Plan),
-    ) -> bool {
-        let mut located = plan.located(key);
-        if pair == ElementPair::VertexEdge {
-            // Such pairs are named edge first, but tested vertex first.
-            located.reverse();
-        }
-        // The first again, where there are fewer.
+    ) -> PairPoints {
         let mut own = [usize::MAX; 4];
         let mut n = 0;
-        for (part, element) in &located {
+        for (part, element) in located {
             let corners = plan
                 .body(scene, *part)
                 .corners(plan.part(*part).part, element);
@@ -353,28 +423,43 @@ impl Vertices {
         let first = own[0];
         own[n..].fill(first);
         let [start, now, end] = [0, 1, 2].map(|time| own.map(|vertex| self.ways[vertex][time]));
-        let mut moving = (0..n).filter(|&ix| now[ix] != start[ix]).peekable();
-        if moving.peek().is_none() {
-            // They touch at the start, and stay there.
+        PairPoints {
+            n,
+            own,
+            start,
+            now,
+            end,
+        }
+    }
+
+    /// Stops the vertices of a pair that go towards the other element, or all of them if it touches
+    /// at the start. Returns whether any of them moves: if none does, it touches at the start.
+    fn stop(&self, (pair, key): Pair, is_touching: bool, (scene, plan): (&Scene, &Plan)) -> bool {
+        let located = located(plan, pair, key);
+        let points = self.points(&located, (scene, plan));
+        if points.moving().next().is_none() {
             return false;
         }
         if is_touching {
-            moving.for_each(|ix| self.stop_at(own[ix], 0.0));
-            return true;
+            return self.stop_by(&points, &[0.0; 4]);
         }
-        let kept = plan.kept(scene, located, pair, [&start, &end]);
-        let ways = [&start, &now, &end];
-        let is_any_less =
-            |shares: &[f64; 4]| (0..n).any(|ix| now[ix] != start[ix] && shares[ix] < 1.0);
+        let kept = plan.kept(scene, located, pair, [&points.start, &points.end]);
+        let is_any_less = |shares: &[f64; 4]| points.moving().any(|ix| shares[ix] < 1.0);
         // Where no share is less, the planes are too close for that.
-        let shares = shares_apart(pair, ways, kept)
+        let shares = shares_apart(pair, points.times(), kept)
             .filter(is_any_less)
-            .unwrap_or_else(|| shares_without_room(pair, ways, kept));
-        for ix in moving {
-            if shares[ix] < 1.0 {
-                self.stop_at(own[ix], shares[ix]);
-            }
+            .unwrap_or_else(|| shares_without_room(pair, points.times(), kept));
+        self.stop_by(&points, &shares)
+    }
+
+    /// Has the vertices of a pair that move go shares of their ways. Returns whether any of them
+    /// may go less than the whole.
+    fn stop_by(&self, points: &PairPoints, shares: &[f64; 4]) -> bool {
+        let mut any = false;
+        for ix in points.moving().filter(|&ix| shares[ix] < 1.0) {
+            any = true;
+            self.stop_at(points.own[ix], shares[ix]);
         }
-        false
+        any
     }
 }

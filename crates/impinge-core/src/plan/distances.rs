@@ -231,7 +231,7 @@ impl Plan {
     }
 
     /// Makes this a question about all ways that end at rounded positions, at any time of the step.
-    pub(super) fn round(&mut self, scene: &Scene) {
+    pub(crate) fn round(&mut self, scene: &Scene) {
         // The parts of a body share its positions.
         let mut of_bodies = BTreeMap::new();
         for ix in 0..self.parts.len() {

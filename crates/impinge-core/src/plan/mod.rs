@@ -346,6 +346,24 @@ impl Plan {
         Ok(plan)
     }
 
+    /// The question which boxes overlap during the same step, of elements that may come as near as
+    /// those may: keys are the same.
+    pub(crate) fn overlapping(&self, scene: &Scene, limits: Limits) -> Self {
+        let mut plan = Plan {
+            question: Question::Overlap,
+            sweep: Question::Overlap.sweep(),
+            limits,
+            since: Instant::now(),
+            ..self.clone()
+        };
+        let keep = Keep {
+            separation: self.bound,
+            ..Keep::default()
+        };
+        plan.keep(scene, keep);
+        plan
+    }
+
     /// The kinds of pairs, if the query names them.
     #[cfg(feature = "gpu")]
     pub(crate) fn kinds_named(&self) -> Option<PairKinds> {

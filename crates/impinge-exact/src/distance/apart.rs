@@ -58,9 +58,49 @@ fn usual_apart(
 ) -> Option<[f64; 4]> {
     let is_possible = |across: &Across| across.room(start, distance).is_some_and(|room| room > 0.0);
     let possible = ways(pair, [start, end]).filter(is_possible);
-    let shares = possible.map(|across| across.shares([start, now, end], distance));
+    farthest(possible.map(|across| across.shares([start, now, end], distance, Planes::Follow)))
+}
+
+/// The shares of which the least is largest.
+fn farthest(shares: impl Iterator<Item = [f64; 4]>) -> Option<[f64; 4]> {
     let least = |shares: &[f64; 4]| shares.iter().fold(1.0, |least: f64, &x| least.min(x));
     shares.max_by(|a, b| least(a).total_cmp(&least(b)))
+}
+
+/// As [`shares_apart`], but the planes rest: the elements stay apart wherever each point stops, if
+/// none goes farther than its share of its way, or than it is now if that is 1. Positions on the
+/// ways may be off by `rounded` along each axis, those that are now included.
+///
+/// `None` if there is not certainly so much room.
+#[must_use]
+pub fn shares_at_rest(
+    pair: ElementPair,
+    times: [&[Point; 4]; 3],
+    distance: f64,
+    rounded: f64,
+) -> Option<[f64; 4]> {
+    let scale = to_usual_size(&times).unwrap_or(1.0);
+    at_usual_size(times, distance, |times, distance| {
+        usual_at_rest(pair, times, distance, rounded * scale)
+    })
+}
+
+/// [`shares_at_rest`] of usual sizes.
+fn usual_at_rest(
+    pair: ElementPair,
+    times: [&[Point; 4]; 3],
+    distance: f64,
+    rounded: f64,
+) -> Option<[f64; 4]> {
+    let [start, _, end] = times;
+    let shares = ways(pair, [start, end]).filter_map(|across| {
+        // A height changes by at most three times as much as a coordinate, of a point that is now
+        // where it is and of where it stops.
+        let off = across.noise(&times, distance) + 6.0 * rounded;
+        let room = across.room(start, distance)?;
+        (room > 8.0 * off).then(|| across.shares(times, distance, Planes::Rest { off }))
+    });
+    farthest(shares)
 }
 
 /// The same for elements that are farther apart at the start, but by so little that heights in
@@ -113,9 +153,9 @@ fn usual_without_room(
     let Some((room, across)) = best else {
         return stays_if(|ix| now[ix] != start[ix]);
     };
-    let noise = across.noise([start, now], distance);
+    let noise = across.noise(&[start, now], distance);
     if LEAST_SHARE * room > noise {
-        let shares = across.shares([start, now, end], distance);
+        let shares = across.shares([start, now, end], distance, Planes::Follow);
         if (0..pair.n_points()).any(|ix| now[ix] != start[ix] && shares[ix] < 1.0) {
             return shares;
         }
@@ -137,6 +177,15 @@ fn ways<'a>(
         .into_iter()
         .map(move |points| shortest_way(pair, points));
     ways.filter_map(move |way| Across::new(way, pair))
+}
+
+/// What the planes between two elements do.
+#[derive(Clone, Copy, PartialEq)]
+enum Planes {
+    /// If only one element comes nearer, its plane is as near as the other is now.
+    Follow,
+    /// They are good wherever the points stop, with heights off by so much.
+    Rest { off: f64 },
 }
 
 /// A direction from the second element to the first.
@@ -209,20 +258,32 @@ impl Across {
         (!room.is_nan()).then_some(room)
     }
 
-    /// See [`shares_apart`].
-    fn shares(&self, [start, now, end]: [&[Point; 4]; 3], distance: f64) -> [f64; 4] {
+    /// See [`shares_apart`] and [`shares_at_rest`].
+    fn shares(
+        &self,
+        [start, now, end]: [&[Point; 4]; 3],
+        distance: f64,
+        planes: Planes,
+    ) -> [f64; 4] {
         let origin = &start[0];
         let thick = self.thick(distance);
         let [low, high] = self.bounds(start, origin, 0.0);
         let [low_now, high_now] = self.bounds(now, origin, 0.0);
         let room = low - high - thick;
-        let spare = LEAST_SHARE * room;
+        let least_spare = match planes {
+            Planes::Follow => 0.0,
+            Planes::Rest { off } => 2.0 * off,
+        };
+        let spare = (LEAST_SHARE * room).max(least_spare);
         // How far each has come towards the other.
         let come = [low - low_now, high_now - high];
-        let levels = match come.map(|come| come > 0.0) {
+        let levels = match come.map(|come| come > 0.0 || planes != Planes::Follow) {
             [true, true] => {
-                let given = (room * (come[0] / (come[0] + come[1]))).clamp(spare, room - spare);
-                let level = low - given;
+                let [first, second] = come.map(|come| come.max(0.0));
+                // Where neither comes nearer, that is no number: the middle.
+                let share = first / (first + second);
+                let share = if share.is_nan() { 0.5 } else { share };
+                let level = low - (room * share).clamp(spare, room - spare);
                 [level + 0.5 * spare, level - thick - 0.5 * spare]
             }
             // The first one stays where it is now, and the second one may follow it.
@@ -245,8 +306,8 @@ impl Across {
     }
 
     /// More than all errors of heights, and of what planes are apart, together.
-    fn noise(&self, times: [&[Point; 4]; 2], distance: f64) -> f64 {
-        let of_heights = times.into_iter().flat_map(|points| {
+    fn noise(&self, times: &[&[Point; 4]], distance: f64) -> f64 {
+        let of_heights = times.iter().flat_map(|points| {
             let sides = self.sides();
             sides.map(|(ix, _)| self.height(&points[ix], &times[0][0])[1])
         });
@@ -384,6 +445,57 @@ mod tests {
         assert!(n_free > 2000 && n_stopped > 2000, "{n_free} {n_stopped}");
     }
 
+    /// Planes at rest are good wherever points stop, also beside their ways by as much as rounding
+    /// moves them.
+    #[test]
+    fn planes_at_rest_part_elements_wherever_their_points_stop() {
+        let mut numbers = Numbers(19);
+        let (mut n_apart, mut n_met, mut n_none) = (0, 0, 0);
+        for round in 0..20_000 {
+            let pair = PAIRS[round % 4];
+            let scale = [1.0, 0.1, 1e-3][round / 4 % 3];
+            let [start, end] = [(); 2].map(|()| [(); 4].map(|()| numbers.point(4, scale)));
+            let distance = [0.0, 0.25, 0.7][round % 3] * scale;
+            let rounded = [0.0, 1e-6, 1e-3, 0.02][round / 7 % 4] * scale;
+            // A point on its way, off by what rounding takes.
+            let at = |shares: &[f64; 4], numbers: &mut Numbers| -> [Point; 4] {
+                core::array::from_fn(|ix| {
+                    let off = numbers.point(8, rounded / 8.0);
+                    core::array::from_fn(|k| {
+                        start[ix][k] + shares[ix] * (end[ix][k] - start[ix][k]) + off[k]
+                    })
+                })
+            };
+            let now = at(&[1.0; 4], &mut numbers);
+            let Some(shares) = shares_at_rest(pair, [&start, &now, &end], distance, rounded) else {
+                n_none += 1;
+                continue;
+            };
+            for _ in 0..4 {
+                // Of points that stay where they are now, and of those that go back: any share.
+                let less = [(); 4].map(|()| numbers.next(1025) / 1024.0);
+                let taken = core::array::from_fn(|ix| shares[ix] * [1.0, less[ix]][round / 2 % 2]);
+                let mut to = at(&taken, &mut numbers);
+                for ix in 0..4 {
+                    if taken[ix] == 1.0 {
+                        to[ix] = now[ix];
+                    }
+                }
+                assert_eq!(
+                    first_within(pair, &start, &to, distance),
+                    None,
+                    "{shares:?}"
+                );
+                n_apart += 1;
+            }
+            n_met += usize::from(first_within(pair, &start, &now, distance).is_some());
+        }
+        assert!(
+            n_apart > 20_000 && n_met > 2000 && n_none > 2000,
+            "{n_apart} {n_met} {n_none}"
+        );
+    }
+
     /// Squares of such sizes overflow or underflow, and shares are the same.
     #[test]
     fn shares_do_not_depend_on_the_size() {
@@ -400,6 +512,7 @@ mod tests {
                 (
                     shares_apart(pair, times, distance),
                     shares_without_room(pair, times, distance),
+                    shares_at_rest(pair, times, distance, 0.01 * size),
                 )
             };
             let usual = both(0);

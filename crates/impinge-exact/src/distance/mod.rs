@@ -34,7 +34,7 @@ mod tests;
 use super::Point;
 use super::algebra::fixed::{WholeVector, cross, difference, dot};
 use super::element_pair::ElementPair;
-pub use apart::{shares_apart, shares_without_room};
+pub use apart::{shares_apart, shares_at_rest, shares_without_room};
 pub use by_part::{PairAtPart, closest_by_part};
 pub use elements::{NearestOfElements, are_within_certainly, elements_are_within};
 pub use elements::{

@@ -1,10 +1,12 @@
 //! What is near, how near, and how far it may go.
 
 mod near;
+mod piles;
 mod reuse;
 mod safe;
 mod separation;
 mod smallest;
 mod stencils;
+mod stopped;
 mod thickness;
 mod truncate;

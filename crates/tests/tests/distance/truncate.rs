@@ -7,7 +7,7 @@ use impinge_scenes::{Random, soup, surfaces};
 use impinge_tests::{detector, detectors};
 
 /// The vertices of all bodies that move: at the start, at the end, and where they were stopped.
-fn ways(scene: &Scene, truncation: &Truncation) -> Vec<[[f64; 3]; 3]> {
+pub(super) fn ways(scene: &Scene, truncation: &Truncation) -> Vec<[[f64; 3]; 3]> {
     let mut all = Vec::new();
     for (id, body) in scene.bodies() {
         let Some(end) = body.end_positions() else {
@@ -21,7 +21,7 @@ fn ways(scene: &Scene, truncation: &Truncation) -> Vec<[[f64; 3]; 3]> {
 }
 
 /// The same scene with other ends.
-fn with_ends(scene: &Scene, truncation: &Truncation) -> Scene {
+pub(super) fn with_ends(scene: &Scene, truncation: &Truncation) -> Scene {
     let mut scene = scene.clone();
     for (id, at) in truncation.iter() {
         match at {
@@ -34,7 +34,7 @@ fn with_ends(scene: &Scene, truncation: &Truncation) -> Scene {
 }
 
 /// Asks all detectors, and tests the answer.
-fn checked(scene: &Scene, query: &Query) -> Truncation {
+pub(super) fn checked(scene: &Scene, query: &Query) -> Truncation {
     let [truncation, others @ ..] =
         detectors().map(|mut detector| detector.truncate(scene, query).expect("an answer"));
     for other in others {
@@ -65,7 +65,7 @@ fn held<R: Real>(points: &[[f64; 3]], round: impl Fn(f64) -> R) -> Vec<[R; 3]> {
 }
 
 /// Triangles that fly about, small enough to be apart at the start.
-fn flying<R: Real>(
+pub(super) fn flying<R: Real>(
     random: &mut Random,
     n: usize,
     far: f64,
@@ -213,7 +213,7 @@ fn a_chain_of_such_steps_never_touches() {
 }
 
 /// Triangles that are apart, on their ways.
-fn soup_in_motion(random: &mut Random) -> Scene {
+pub(super) fn soup_in_motion(random: &mut Random) -> Scene {
     let mut scene = Scene::new();
     let mut at = Vec::new();
     for ix in 0..125 {
