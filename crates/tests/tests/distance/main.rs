@@ -1,7 +1,9 @@
 //! What is near, how near, and how far it may go.
 
+mod filtered;
 mod near;
 mod piles;
+mod rational;
 mod reuse;
 mod safe;
 mod separation;

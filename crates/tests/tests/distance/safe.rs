@@ -2,22 +2,22 @@
 
 use impinge_core::exact::{ElementPair, Point, are_within, closest_points, edge_face_are_within};
 use impinge_core::{
-    BodyId, Bounds, Csr, Elements, Error, Method, PairKind, Part, Query, SafeDistances, Scene,
-    Thickness,
+    BodyId, Bounds, Csr, Elements, Error, Method, PairKind, Part, Positions, Query, SafeDistances,
+    Scene, Thickness,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
 use impinge_tests::{detector, detectors};
 
 /// An element of one body, by its corners.
 #[derive(Debug, Clone)]
-struct Held {
-    body: BodyId,
-    part: Part,
-    element: u32,
-    corners: Vec<u32>,
+pub(super) struct Held {
+    pub body: BodyId,
+    pub part: Part,
+    pub element: u32,
+    pub corners: Vec<u32>,
 }
 
-fn elements(scene: &Scene, part: Part) -> Vec<Held> {
+pub(super) fn elements(scene: &Scene, part: Part) -> Vec<Held> {
     let mut all = Vec::new();
     for (body, held) in scene.bodies() {
         let n = match part {
@@ -49,7 +49,7 @@ fn elements(scene: &Scene, part: Part) -> Vec<Held> {
     all
 }
 
-fn points(scene: &Scene, of: &Held) -> Vec<Point> {
+pub(super) fn points(scene: &Scene, of: &Held) -> Vec<Point> {
     let positions = scene.body(of.body).expect("held").positions();
     let point = |&corner: &u32| positions.point(corner as usize);
     of.corners.iter().map(point).collect()
@@ -57,7 +57,7 @@ fn points(scene: &Scene, of: &Held) -> Vec<Point> {
 
 /// All pairs of elements of the kinds that meet in a test, and their points as the exact tests take
 /// them.
-fn pairs(scene: &Scene) -> Vec<(PairKind, Held, Held, [Point; 4])> {
+pub(super) fn pairs(scene: &Scene) -> Vec<(PairKind, Held, Held, [Point; 4])> {
     let [vertices, edges, faces] =
         [Part::Vertices, Part::Edges, Part::Faces].map(|part| elements(scene, part));
     let mut all = Vec::new();
@@ -98,7 +98,7 @@ fn pairs(scene: &Scene) -> Vec<(PairKind, Held, Held, [Point; 4])> {
     all
 }
 
-fn test_of(kind: PairKind) -> ElementPair {
+pub(super) fn test_of(kind: PairKind) -> ElementPair {
     match kind {
         PairKind::VertexFace => ElementPair::VertexFace,
         PairKind::EdgeEdge => ElementPair::EdgeEdge,
@@ -126,6 +126,16 @@ fn largest(safe: &SafeDistances, of: &Held) -> f64 {
 /// Holds the bounds against every pair: together, two elements move less than they are apart, and
 /// no bound is much smaller than it must be.
 fn check(scene: &Scene, safe: &SafeDistances, most: f64, fixed: &[BodyId]) -> [usize; 2] {
+    check_those(scene, safe, (most, fixed), |_, _, _| true)
+}
+
+/// The same for those pairs that a function keeps, which the question did not leave out.
+pub(super) fn check_those(
+    scene: &Scene,
+    safe: &SafeDistances,
+    (most, fixed): (f64, &[BodyId]),
+    keeps: impl Fn(PairKind, &Held, &Held) -> bool,
+) -> [usize; 2] {
     let thickness = |of: &Held| {
         let body = scene.body(of.body).expect("held");
         match body.thickness_by_element() {
@@ -139,7 +149,20 @@ fn check(scene: &Scene, safe: &SafeDistances, most: f64, fixed: &[BodyId]) -> [u
     };
     let mut least = std::collections::BTreeMap::new();
     let (mut n_touching, mut n_bounded) = (0, 0);
+    for held in [Part::Vertices, Part::Edges, Part::Faces].map(|part| elements(scene, part)) {
+        for of in held {
+            for corner in of.corners {
+                least.insert(
+                    (of.body, corner),
+                    if fixed.contains(&of.body) { 0.0 } else { most },
+                );
+            }
+        }
+    }
     for (kind, a, b, four) in pairs(scene) {
+        if !keeps(kind, &a, &b) {
+            continue;
+        }
         let thick = [thickness(&a), thickness(&b)];
         let moves = [largest(safe, &a), largest(safe, &b)];
         let sum = sum_up(&[moves[0], moves[1], thick[0], thick[1]]);
@@ -171,7 +194,10 @@ fn check(scene: &Scene, safe: &SafeDistances, most: f64, fixed: &[BodyId]) -> [u
             let shares = e.body == f.body && e.corners.iter().any(|c| f.corners.contains(c));
             let (ends, face) = (points(scene, &e), points(scene, &f));
             let face = [face[0], face[1], face[2]];
-            if !shares && edge_face_are_within(&[ends[0], ends[1]], &face, 0.0) {
+            if shares || !keeps(PairKind::EdgeFace, &e, &f) {
+                continue;
+            }
+            if edge_face_are_within(&[ends[0], ends[1]], &face, 0.0) {
                 for of in [&e, &f] {
                     assert_eq!(largest(safe, of), 0.0, "{e:?} {f:?}");
                     for &corner in &of.corners {
@@ -195,7 +221,7 @@ fn check(scene: &Scene, safe: &SafeDistances, most: f64, fixed: &[BodyId]) -> [u
 
 /// A scene of small bodies of every kind: on a lattice, where many elements touch, are parallel,
 /// coplanar or degenerate; or at random.
-fn scene(seed: u64, is_lattice: bool, is_double: bool) -> (Scene, Vec<BodyId>) {
+pub(super) fn scene(seed: u64, is_lattice: bool, is_double: bool) -> (Scene, Vec<BodyId>) {
     let mut random = Random::new(seed);
     let mut scene = Scene::new();
     let mut points = |n: usize| -> Vec<[f64; 3]> {
@@ -467,6 +493,66 @@ fn what_moves_within_its_bounds_never_touches() {
         scene.set_positions(body, end).expect("good");
         assert!(!detector.any(&scene, &query).expect("good"));
     }
+}
+
+/// On any path: from the same start, vertices go from place to place within their bounds, straight
+/// and with corners, each time as far as they may.
+#[test]
+fn paths_with_corners_within_the_bounds_never_touch() {
+    let mut random = Random::new(29);
+    let mut detector = detector(Method::Clusters, 2);
+    let query = Query::all();
+    let (mut n_ways, mut n_far) = (0, 0);
+    for round in 0..8 {
+        // Two crumpled layers with a ball between them.
+        let mut scene = Scene::new();
+        let layers =
+            [-0.6, 0.6].map(|height| surfaces::cloth(8, 8, 0.15).translated([-0.6, -0.6, height]));
+        let models = layers.into_iter().chain([surfaces::bumpy_ball(200, 0.3)]);
+        let mut starts = Vec::new();
+        for model in models {
+            let crumpled = model.positions.iter().map(|p| {
+                let q = random.point(-0.05, 0.05);
+                [0, 1, 2].map(|k: usize| f64::from(p[k] + q[k]))
+            });
+            let start = Vec::from_iter(crumpled);
+            let body = scene
+                .add((model.elements.clone(), start.clone()))
+                .expect("good");
+            starts.push((body, start));
+        }
+        let most = [0.02, 0.1, 1.0][round % 3];
+        let safe = detector.safe_distances(&scene, most, &query).expect("good");
+        assert!(safe.touching().is_empty());
+        let first = scene.clone();
+        for _ in 0..10 {
+            for (body, _) in &starts {
+                let end = moved(&first, &safe, *body, &mut random);
+                let from = scene.body(*body).expect("held").positions();
+                n_far += (0..end.len())
+                    .filter(|&ix| {
+                        let bound = safe.of(*body).expect("held").get(ix);
+                        let way = [0, 1, 2].map(|k: usize| end[ix][k] - from.point(ix)[k]);
+                        way.iter().map(|x| x * x).sum::<f64>().sqrt() > 1.5 * bound
+                    })
+                    .count();
+                scene.set_end_positions(*body, end).expect("good");
+            }
+            assert!(detector.is_free(&scene, &query).expect("good"));
+            n_ways += 1;
+            for (body, _) in &starts {
+                let end = scene.body(*body).expect("held").end_positions().cloned();
+                match end.expect("it moves") {
+                    Positions::F32(end) => scene.set_positions(*body, end),
+                    Positions::F64(end) => scene.set_positions(*body, end),
+                }
+                .expect("good");
+                scene.clear_end_positions(*body).expect("good");
+            }
+        }
+    }
+    // Many go farther at once than from their starts.
+    assert!(n_ways == 80 && n_far > 1000, "{n_far}");
 }
 
 /// A list as `(row, column)` pairs.
