@@ -152,6 +152,93 @@ fn steps_and_safe_distances_on_the_device_leave_out_what_the_question_does() {
     assert_between("re-meshed", &found, &pairs, &scene, &query, &query);
 }
 
+/// Wrong lines of the kernel that leaves pairs out: of each question about groups, pins, rings, lists
+/// or names some answer is wrong.
+#[test]
+fn damaged_filters_are_noticed() {
+    let caller = Caller::new();
+    let mut random = Random::new(93);
+    let (free, bodies) = scene();
+    let mut pinned = free.clone();
+    for &body in &bodies {
+        let n = pinned.body(body).expect("held").n_vertices();
+        let pins: Vec<bool> = (0..n).map(|_| random.below(4) > 0).collect();
+        pinned.set_pinned(body, &pins).expect("good");
+    }
+    let asked = queries(&mut random, &free, &bodies);
+    let mut cases = Vec::from_iter(
+        asked
+            .iter()
+            .map(|(name, query, _)| (*name, &free, query.clone())),
+    );
+    cases.push(("pins alone", &pinned, Query::all()));
+    let holds = |detector: &mut Detector| {
+        cases.iter().all(|(name, scene, query)| {
+            let asks = || {
+                let (found, pairs, _) = listed(&caller, detector, scene, query, [&[], &[]]);
+                assert_between(name, &found, &pairs, scene, query, query);
+            };
+            std::panic::catch_unwind(std::panic::AssertUnwindSafe(asks)).is_ok()
+        })
+    };
+    assert!(holds(&mut caller.detector(Settings::default())));
+    let mut unnoticed = Vec::new();
+    for (line, wrong) in [
+        // Pinned vertices.
+        (
+            "mark(corner.z) & mark(corner.w) & PINNED",
+            "mark(corner.z) & PINNED",
+        ),
+        (
+            "(are_pinned(a) && are_pinned(b))",
+            "(are_pinned(a) || are_pinned(b))",
+        ),
+        ("(are_pinned(a) && are_pinned(b))", "false"),
+        // Groups.
+        ("mark(of_b[j]) & ~PINNED", "mark(of_b[i]) & ~PINNED"),
+        (
+            "if !has_pair(groups, n, pair) {",
+            "if has_pair(groups, n, pair) {",
+        ),
+        ("|| are_apart(a, b)", ""),
+        (
+            "let n = rules[RULES_N_GROUPS];",
+            "let n = rules[RULES_N_GROUPS] - 1u;",
+        ),
+        // Lists, by which rings are left out, too.
+        ("|| are_listed(a, b)", ""),
+        (" || has_in_list(lists, of_b[j], of_a[i])", ""),
+        (
+            "var high = rules[lists + vertex + 1u];",
+            "var high = rules[lists + vertex];",
+        ),
+        // Pairs by name.
+        ("|| are_named(candidate)", ""),
+        (
+            "let n = rules[RULES_N_PAIRS];",
+            "let n = rules[RULES_N_PAIRS] / 2u;",
+        ),
+        (
+            "vec2<u32>(min(numbers.x, numbers.y), max(numbers.x, numbers.y));",
+            "vec2<u32>(max(numbers.x, numbers.y), min(numbers.x, numbers.y));",
+        ),
+        // Of all.
+        ("if ix >= n {", "if ix >= n / 2u {"),
+        (
+            "candidates[ix] = Candidate(NOTHING, NOTHING);",
+            "candidates[ix ^ 1u] = Candidate(NOTHING, NOTHING);",
+        ),
+    ] {
+        let (device, queue) = (caller.device.clone(), caller.queue.clone());
+        let damage = ("left_out", line, wrong);
+        let damaged = Detector::with_damage(device, queue, Settings::default(), damage);
+        if holds(&mut damaged.expect("a line")) {
+            unnoticed.push((line, wrong));
+        }
+    }
+    assert!(unnoticed.is_empty(), "{unnoticed:#?}");
+}
+
 #[test]
 fn frames_on_the_device_leave_out_what_the_question_does() {
     let caller = Caller::new();
