@@ -9,15 +9,17 @@ use crate::ours::{Feed, Ours};
 use crate::problem::{Ask, Problem, models, posed};
 use crate::report::{Report, figures, grouped};
 use crate::runner::Runner;
-use crate::{Failure, Options, c, distance, files, gpu, near, once, resident, step_sizes, steps};
+use crate::{
+    Failure, Options, c, distance, files, gpu, near, once, resident, solver_sizes, step_sizes,
+    steps,
+};
 
 /// Runs a command by its name.
 pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
     let mut report = match command {
         "two-body" | "motion" | "self" | "tets" | "bodies" | "sizes" | "adversarial" | "gpu"
-        | "resident" | "regular" | "steps" | "step-sizes" | "near" | "distance" | "once" => {
-            Report::new(command)
-        }
+        | "resident" | "regular" | "steps" | "step-sizes" | "solver-sizes" | "near"
+        | "distance" | "once" => Report::new(command),
         "device" => {
             println!("{}", gpu::slug(&gpu::device(options)?));
             return Ok(());
@@ -36,6 +38,7 @@ pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
         "regular" => regular_surfaces(options, &mut report)?,
         "steps" => steps::run(options, &mut report)?,
         "step-sizes" => step_sizes::run(options, &mut report)?,
+        "solver-sizes" => solver_sizes::run(options, &mut report)?,
         "near" => near::run(options, &mut report)?,
         "distance" => distance::run(options, &mut report)?,
         "once" => once::run(options, &mut report)?,

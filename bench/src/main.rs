@@ -29,6 +29,7 @@ mod problem;
 mod report;
 mod resident;
 mod runner;
+mod solver_sizes;
 mod step_sizes;
 mod steps;
 mod surfaces;
@@ -62,6 +63,7 @@ commands:
   steps         contacts of moving cloth: all, the earliest, any, how far a step can be taken, pairs of boxes;
                 --scene cloth-ball|cloth-funnel
   step-sizes    the same questions about two layers of cloth of 10^3 to 10^6 faces: time and memory against size
+  solver-sizes  safe distances, neighbours and truncation of these layers: time against size
   distance      the smallest distance of two bodies: --scene dragon|bunny
   near          elements within a distance, of a mesh with itself: --scene cloth-ball|rumba
   once          the first frame of a new detector, by each method: --scene ball|bunny|buddha|dragon

@@ -17,23 +17,25 @@ use crate::report::{Report, figures, grouped};
 use crate::{Failure, Options};
 
 /// Faces of both layers.
-const SIZES: [usize; 7] = [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000];
+pub const SIZES: [usize; 7] = [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000];
 /// Without the candidates, which come last.
 const QUESTIONS: [&str; 3] = ["earliest", "is_free", "advance"];
 /// Frames before the clock counts.
 const N_WARM: usize = 2;
 
 /// Two layers, and where their vertices are at both ends.
-struct Layers {
-    scene: Scene,
+pub struct Layers {
+    pub scene: Scene,
     bodies: [BodyId; 2],
     ends: [[Vec<[f32; 3]>; 2]; 2],
-    n_faces: usize,
+    pub n_faces: usize,
     n_elements: usize,
+    /// The length of an edge at rest.
+    pub edge: f64,
 }
 
 impl Layers {
-    fn new(n_faces: usize) -> Result<Self, Failure> {
+    pub fn new(n_faces: usize) -> Result<Self, Failure> {
         // Two layers of squares, each cut into two faces.
         let n = ((n_faces as f64 / 4.0).sqrt().round() as usize).max(1);
         let edge = 1.0 / n as f32;
@@ -70,6 +72,7 @@ impl Layers {
             ends,
             n_faces: 2 * n_faces,
             n_elements: 2 * (n_vertices + n_edges + n_faces),
+            edge: edge.into(),
         })
     }
 
@@ -83,7 +86,7 @@ impl Layers {
 }
 
 /// The best of some frames of one question, in milliseconds, and what the last one answered.
-fn best<T>(
+pub fn best<T>(
     layers: &mut Layers,
     n_frames: usize,
     mut ask: impl FnMut(&Scene) -> Result<T, Failure>,

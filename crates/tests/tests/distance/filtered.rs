@@ -4,12 +4,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::safe::{Held, check_those, pairs, test_of};
-use crate::common::{detector, detectors};
 use impinge_core::exact::{are_within, first_contact};
 use impinge_core::{
     BodyId, Exclusion, Method, PairFilter, PairKind, Positions, Query, SafeDistances, Scene,
 };
 use impinge_scenes::{Random, surfaces};
+use impinge_tests::{detector, detectors};
 
 /// A waved cloth over a ball, apart from each other and themselves; both go anywhere.
 fn scene(seed: u64) -> (Scene, [BodyId; 2]) {

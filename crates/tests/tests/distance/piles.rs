@@ -1,9 +1,9 @@
 //! Piles, in which each layer stops the next: rounds end, and where they do, the step is free.
 
-use crate::common::detector;
 use impinge_core::{
     BodyId, Element, Method, PairKind, Positions, Query, Real, Scene, Start, Truncation,
 };
+use impinge_tests::detector;
 
 /// The most rounds, as the documentation has it.
 const MOST_ROUNDS: u32 = 256;

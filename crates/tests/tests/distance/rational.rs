@@ -4,11 +4,11 @@
 use dashu_int::IBig;
 
 use super::safe::{Held, elements, pairs, points, scene};
-use crate::common::detectors;
 use impinge_core::exact::{Point, edge_face_are_within};
 use impinge_core::{BodyId, Exclusion, PairKind, Part, Query, SafeDistances, Scene};
 use impinge_scenes::Random;
 use impinge_testing::data::test_file;
+use impinge_tests::detectors;
 
 type Vector = [IBig; 3];
 

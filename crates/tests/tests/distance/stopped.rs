@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::truncate::{checked, flying, soup_in_motion, ways, with_ends};
-use crate::common::detector;
 use impinge_core::{BodyId, Element, Method, PairKind, Part, Positions, Query, Scene, Truncation};
 use impinge_scenes::{Random, surfaces};
+use impinge_tests::detector;
 
 fn corners(scene: &Scene, part: Part, of: Element) -> Vec<(BodyId, u32)> {
     let body = scene.body(of.body).expect("held");
