@@ -6,7 +6,7 @@
 
 use impinge::exact::{Point, orient2d, orient3d};
 use impinge::{Backend, Detector, Error, Query, Scene, Settings};
-use impinge_io::{Elements, Mesh, Positions, weld};
+use impinge_io::{Elements, Mesh, Positions, Weld};
 
 use crate::copies::Copies;
 use crate::facets::{Facet, facets, groups, is_simplex};
@@ -108,11 +108,14 @@ fn settings(options: &Options) -> Settings {
 fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), Error> {
     let n_vertices = mesh.n_vertices();
     let welds = options.weld && !options.keep_seams;
-    let n_welded = if welds { weld(&mut mesh) } else { 0 };
+    let weld = welds.then(|| Weld::by_position(&mesh.positions));
+    if let Some(weld) = &weld {
+        weld.apply(&mut mesh);
+    }
     mesh.positions.narrow_if_exact();
     let mut counts = Counts {
         n_vertices: n_vertices as u64,
-        n_welded: n_welded as u64,
+        n_welded: weld.as_ref().map_or(0, Weld::n_welded) as u64,
         ..Counts::default()
     };
     let mut marks = vec![Marks::default(); mesh.n_elements()];
@@ -168,9 +171,14 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
             );
         }
     }
+    let mut places = places(&mesh, &marks, &fans, options.places, options.faces);
+    let vertices = places.iter_mut().filter_map(|place| place.vertex.as_mut());
+    if let Some(weld) = &weld {
+        vertices.for_each(|vertex| *vertex = weld.firsts()[*vertex as usize]);
+    }
     let checked = Checked {
         counts,
-        places: places(&mesh, &marks, &fans, options.places, options.faces),
+        places,
         marks,
         mesh,
     };
@@ -180,7 +188,7 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
 /// The mesh with vertices at one position as one. Its elements keep their numbers.
 fn welded(mesh: &Mesh) -> Mesh {
     let mut welded = mesh.clone();
-    weld(&mut welded);
+    impinge_io::weld(&mut welded);
     welded
 }
 

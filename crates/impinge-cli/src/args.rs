@@ -436,6 +436,9 @@ pub struct DistanceArgs {
     /// What becomes a body of its own [default: file; of one file: nodes or groups]
     #[arg(long, value_enum, value_name = "WHAT")]
     pub bodies: Option<BodiesArg>,
+    /// The format of a mesh on standard input, which is named "-": ply, off, stl, …
+    #[arg(long, value_name = "EXT", value_parser = mesh_format)]
+    pub format: Option<impinge_io::Format>,
     /// Leave out the pair of bodies A and B, numbered from 0 as given, such as neighbours in a
     /// joint
     #[arg(long, value_name = "A,B", value_parser = two_bodies)]

@@ -5,7 +5,7 @@ use impinge::{BodyId, Query, Scene, SharedVertex};
 use crate::args::ThicknessArgs;
 use crate::error::Error;
 use crate::load::{Nouns, Vertices};
-use crate::text::{counted, grouped};
+use crate::text::{counted, exactly, grouped};
 
 /// Which pairs were asked for.
 #[derive(Debug, Clone, Copy)]
@@ -174,8 +174,8 @@ pub fn kept(scene: &Scene, distance: f64) -> Option<String> {
     let is_thick = scene.bodies().any(|(_, body)| body.thickness() > 0.0);
     match (distance > 0.0, is_thick) {
         (false, false) => None,
-        (true, false) => Some(distance.to_string()),
-        (true, true) => Some(format!("{distance} and the thickness")),
+        (true, false) => Some(exactly(distance)),
+        (true, true) => Some(format!("{} and the thickness", exactly(distance))),
         (false, true) => Some("the thickness".to_owned()),
     }
 }

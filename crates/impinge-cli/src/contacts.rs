@@ -10,13 +10,14 @@ use impinge_io::{
 };
 
 use crate::error::Error;
+use crate::origins::Origins;
 use crate::report;
 use crate::rows;
 use crate::text::{counted, grouped};
 use crate::values::{CurvesFile, CurvesFormat, RowsFile};
 
 /// Writes one row per corner of each contact.
-pub fn write(file: &RowsFile, contacts: &Contacts) -> Result<(), Error> {
+pub fn write(file: &RowsFile, origins: &Origins, contacts: &Contacts) -> Result<(), Error> {
     let own = [
         Column::new("shape", Holds::Word),
         Column::new("corner", Holds::U8),
@@ -27,10 +28,13 @@ pub fn write(file: &RowsFile, contacts: &Contacts) -> Result<(), Error> {
     ];
     let columns = [&[Column::new("contact", Holds::U32)], &ELEMENTS[..], &own].concat();
     let of_contact = |(number, contact): (u32, usize)| {
-        let [body_a, a, body_b, b] = contacts.rows()[contact].map(Cell::Number);
+        let row @ [in_a, _, in_b, _] = contacts.rows()[contact];
+        let [body_a, a, body_b, b] = row.map(Cell::Number);
         let corners = (0u32..).zip(contacts.corners(contact));
         corners.map(move |(corner, &point)| {
-            let [in_a, in_b] = contacts.names()[point as usize].features.map(cell);
+            let [of_a, of_b] = contacts.names()[point as usize].features;
+            let [of_a, of_b] = [(in_a, of_a), (in_b, of_b)]
+                .map(|(body, feature)| cell(origins.feature(body, feature)));
             [
                 Cell::Number(number),
                 body_a,
@@ -40,8 +44,8 @@ pub fn write(file: &RowsFile, contacts: &Contacts) -> Result<(), Error> {
                 word(contacts.shape(contact)),
                 Cell::Number(corner),
                 Cell::Number(point),
-                in_a,
-                in_b,
+                of_a,
+                of_b,
                 Cell::Point(contacts.points()[point as usize]),
             ]
         })

@@ -2,6 +2,7 @@
 
 use std::io::{Read, Write, stderr, stdin};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use impinge::{BodyId, CancelToken, Scene};
 use impinge_io::{
@@ -11,6 +12,7 @@ use impinge_io::{
 
 use crate::args::{AskArgs, BodiesArg};
 use crate::error::Error;
+use crate::origins::{Origin, Origins};
 use crate::text::grouped;
 use crate::watch::go_on;
 
@@ -24,6 +26,7 @@ pub struct Bodies {
     pub ids: Vec<BodyId>,
     pub names: Vec<String>,
     pub vertices: Vec<Vertices>,
+    pub origins: Origins,
     pub nouns: Nouns,
     /// Files that could not be read: the number of the body, and why. Such a body has no
     /// elements.
@@ -234,6 +237,7 @@ impl Bodies {
         self.ids.push(id);
         self.names.push(path.display().to_string());
         self.vertices.push(Vertices::default());
+        self.origins.push(Origin::default());
         Ok(())
     }
 
@@ -242,12 +246,12 @@ impl Bodies {
         &mut self,
         path: &Path,
         loading: Loading<'_>,
-    ) -> Result<(BodyId, Option<Weld>), Error> {
+    ) -> Result<(BodyId, Option<Arc<Weld>>), Error> {
         let format = self.format(path, loading)?;
         let (name, (meshes, summary)) = self.read_one(path, format, false, loading)?;
         tell(&name, &summary.notes());
         let mut added = None;
-        for NamedMesh { mesh, .. } in meshes {
+        for mesh in meshes {
             added = Some(self.add_mesh(name.clone(), format, mesh, loading)?);
         }
         // A file is one mesh, unless its parts are asked for.
@@ -276,9 +280,10 @@ impl Bodies {
         &mut self,
         name: String,
         format: Format,
-        mut mesh: Mesh,
+        mesh: NamedMesh,
         loading: Loading<'_>,
-    ) -> Result<(BodyId, Option<Weld>), Error> {
+    ) -> Result<(BodyId, Option<Arc<Weld>>), Error> {
+        let (read, mut mesh) = (mesh.vertices, mesh.mesh);
         let welds = loading.welds(format);
         let mut vertices = Vertices::default();
         let mut welding = None;
@@ -291,7 +296,7 @@ impl Bodies {
                     n_welded: weld.n_welded(),
                     n_coincident: Some(0),
                 };
-                welding = Some(weld);
+                welding = Some(Arc::new(weld));
             } else {
                 vertices.n_coincident = Some(weld.n_welded());
             }
@@ -315,6 +320,7 @@ impl Bodies {
         self.ids.push(id);
         self.names.push(name);
         self.vertices.push(vertices);
+        self.origins.push(Origin::new(read, welding.as_ref()));
         Ok((id, welding))
     }
 
@@ -336,7 +342,7 @@ impl Bodies {
     ) -> Result<(String, (Vec<NamedMesh>, Summary)), Error> {
         go_on(loading.cancel)?;
         let options = ReadOptions::as_they_are();
-        let whole = |(mesh, summary)| (vec![NamedMesh { name: None, mesh }], summary);
+        let whole = |(mesh, summary)| (vec![NamedMesh::whole(None, mesh)], summary);
         if path != Path::new(STDIN) {
             let read = match in_parts {
                 true => read_bodies(path, &options)?,
@@ -364,15 +370,15 @@ pub fn named_parts(
     file: &str,
     parts: Vec<NamedMesh>,
     several: bool,
-) -> impl Iterator<Item = (String, Mesh)> {
+) -> impl Iterator<Item = (String, NamedMesh)> {
     let has_parts = parts.len() > 1;
-    parts.into_iter().map(move |NamedMesh { name, mesh }| {
-        let name = match name.filter(|_| has_parts) {
+    parts.into_iter().map(move |part| {
+        let name = match part.name.clone().filter(|_| has_parts) {
             None => file.to_owned(),
             Some(part) if several => format!("{file}#{part}"),
             Some(part) => part,
         };
-        (name, mesh)
+        (name, part)
     })
 }
 
@@ -382,7 +388,7 @@ pub const NAME_OF_STDIN: &str = "standard input";
 /// The format of standard input, which has no ending.
 pub fn format_of_stdin(format: Option<Format>) -> Result<Format, Error> {
     format.ok_or_else(|| {
-        let text = "a mesh from standard input needs its format, such as --format ply (`distance` and `step` read files alone)";
+        let text = "a mesh from standard input needs its format, such as --format ply";
         Error::Usage(text.to_owned())
     })
 }

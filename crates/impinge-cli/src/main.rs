@@ -13,6 +13,7 @@ mod headline;
 mod load;
 mod meshes;
 mod one_mesh;
+mod origins;
 mod output;
 mod palette;
 mod picture;

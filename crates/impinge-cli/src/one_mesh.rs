@@ -3,14 +3,34 @@
 use std::path::Path;
 
 use impinge::{BodyId, BodyKind, CancelToken, Control, Detector, Scene};
-use impinge_io::Weld;
+use impinge_io::{ReadOptions, read_rows_bytes};
 
 use crate::args::OneMeshArgs;
 use crate::asked;
 use crate::detection::on_cpu;
 use crate::error::Error;
-use crate::load::{Bodies, Loading};
+use crate::load::{Bodies, Loading, NAME_OF_STDIN, STDIN, stdin_bytes};
 use crate::report;
+
+/// Rows of numbers from standard input, if that is the name of the file; `None` if not. The mesh
+/// cannot come from there, too.
+pub fn rows_of_stdin<const N: usize>(
+    option: &str,
+    path: &Path,
+    mesh: &Path,
+) -> Result<Option<Vec<[f64; N]>>, Error> {
+    if path != Path::new(STDIN) {
+        return Ok(None);
+    }
+    if mesh == path {
+        let text = format!(
+            "{option}: the mesh comes from standard input already: give one of them a file"
+        );
+        return Err(Error::Usage(text));
+    }
+    let bytes = stdin_bytes(&ReadOptions::as_they_are())?;
+    Ok(Some(read_rows_bytes(&bytes, NAME_OF_STDIN)?))
+}
 
 /// A scene of one mesh.
 pub struct OneMesh {
@@ -18,7 +38,6 @@ pub struct OneMesh {
     pub id: BodyId,
     /// The file as given.
     pub name: String,
-    weld: Option<Weld>,
 }
 
 impl OneMesh {
@@ -27,14 +46,9 @@ impl OneMesh {
         // Whether a surface is closed depends on which vertices are welded, as self-collision does.
         let loading = Loading::as_they_are(!args.json, cancel).asked(weld, true, args.format);
         let mut bodies = Bodies::default();
-        let (id, weld) = bodies.add(path, loading)?;
+        let (id, _) = bodies.add(path, loading)?;
         let name = bodies.names[0].clone();
-        Ok(OneMesh {
-            bodies,
-            id,
-            name,
-            weld,
-        })
+        Ok(OneMesh { bodies, id, name })
     }
 
     pub fn scene(&self) -> &Scene {
@@ -61,12 +75,8 @@ impl OneMesh {
 
     /// The error with the name of the file, and vertices as the file numbers them.
     pub fn refused(&self, mut error: impinge::Error) -> Error {
-        if let impinge::Error::NotClosed { edge, .. } = &mut error
-            && let Some(weld) = &self.weld
-        {
-            // Of welded vertices the first one stays.
-            let first = |welded| weld.map().iter().position(|&index| index == welded);
-            *edge = edge.map(|welded| first(welded).map_or(welded, |ix| ix as u32));
+        if let impinge::Error::NotClosed { edge, .. } = &mut error {
+            *edge = edge.map(|vertex| self.bodies.origins.vertex(0, vertex));
         }
         match error {
             impinge::Error::NotClosed { .. } | impinge::Error::WrongKind { .. } => Error::Refused {

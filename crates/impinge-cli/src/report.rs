@@ -379,7 +379,7 @@ pub struct Impact {
     pub kind: &'static str,
     /// Bodies are numbered from 0 as given
     pub body_a: u32,
-    /// Of kind vf, the vertex
+    /// Of kind vf, the vertex: as in the file, of welded ones the first
     pub element_a: u32,
     pub body_b: u32,
     /// Of kind vf, the face
@@ -473,7 +473,7 @@ pub struct Safe {
     #[cfg_attr(test, schemars(range(min = 0)))]
     pub most: f64,
     pub asked: Asked,
-    /// How many vertices there are in bodies that are not fixed
+    /// How many vertices the files have of bodies that are not fixed
     pub vertices: usize,
     /// How many of them may move by less than `most`
     pub bounded: usize,
@@ -495,6 +495,7 @@ pub struct Safe {
 pub struct SafeVertex {
     /// Bodies are numbered from 0 as given
     pub body: usize,
+    /// As in the file, of welded ones the first
     pub vertex: usize,
     /// Rounded down
     #[cfg_attr(test, schemars(range(min = 0)))]

@@ -9,6 +9,7 @@ use impinge::{Impact, NearPair, NearPairs};
 use impinge_io::{AtomicFile, Cell, Column, ELEMENTS, Holds, KIND, Table, TableFormat};
 
 use crate::error::Error;
+use crate::origins::Origins;
 use crate::output::out;
 use crate::values::{RowsFile, RowsFormat};
 
@@ -187,12 +188,13 @@ pub fn number(ix: usize) -> Cell<'static> {
 }
 
 /// The row of an impact.
-pub fn impact(impact: &Impact) -> [Cell<'static>; 6] {
-    Cell::impact(impact.kind.name(), impact.row(), impact.toi)
+pub fn impact(origins: &Origins, impact: &Impact) -> [Cell<'static>; 6] {
+    let row = origins.row(impact.kind, impact.row());
+    Cell::impact(impact.kind.name(), row, impact.toi)
 }
 
 /// Writes near pairs; distances and nearest points were asked for.
-pub fn write_near(file: &RowsFile, near: &NearPairs) -> Result<(), Error> {
+pub fn write_near(file: &RowsFile, origins: &Origins, near: &NearPairs) -> Result<(), Error> {
     let more = [
         // The longest is `EA0_EB1`.
         Column::new("type", Holds::Text(7)),
@@ -208,12 +210,13 @@ pub fn write_near(file: &RowsFile, near: &NearPairs) -> Result<(), Error> {
         file,
         columns,
         near.len(),
-        near.iter().map(|pair| of_near(&pair)),
+        near.iter().map(|pair| of_near(origins, &pair)),
     )
 }
 
-fn of_near(pair: &NearPair) -> [Cell<'static>; 12] {
-    let [body_a, a, body_b, b] = pair.row().map(Cell::Number);
+fn of_near(origins: &Origins, pair: &NearPair) -> [Cell<'static>; 12] {
+    let row = origins.row(pair.kind, pair.row());
+    let [body_a, a, body_b, b] = row.map(Cell::Number);
     let [feature_a, feature_b] = pair
         .features
         .map(|feature| Cell::Text(feature_name(feature)));

@@ -28,6 +28,12 @@ pub fn shown_bytes(n: u64) -> String {
     format!("{:.1} TB", n as f64 / unit as f64)
 }
 
+/// A number that reads back to the same bits: 0.25, 2, 5e-324.
+pub fn exactly(number: f64) -> String {
+    let text = format!("{number:?}");
+    text.strip_suffix(".0").unwrap_or(&text).to_owned()
+}
+
 /// The hash of an answer as 16 hexadecimal digits.
 pub fn hash(pairs: &Pairs) -> String {
     hex(pairs.hash())

@@ -1,8 +1,8 @@
 //! The bodies of a file: nodes of a glTF file, objects or groups of an OBJ file.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use crate::mesh::{Elements, Mesh, Positions};
+use crate::mesh::{Elements, Mesh, Positions, Weld};
 
 /// A body of a file, and the name that the file gives it.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,6 +12,37 @@ pub struct NamedMesh {
     pub name: Option<String>,
     /// Its elements in the order of the file, and the vertices that they name.
     pub mesh: Mesh,
+    /// The number of each of its vertices in the file, of welded ones that of the first; ascending.
+    /// `None` if it has the vertices of the file as they are. Objects and groups of an OBJ file
+    /// share one list of vertices. Those of a glTF node are numbered in the `POSITION` accessors
+    /// of its primitives, one after the other in the order of first use; those of a 3MF item in
+    /// its meshes, in the order in which it names them.
+    pub vertices: Option<Vec<u32>>,
+}
+
+impl NamedMesh {
+    /// All of a file.
+    pub fn whole(name: Option<String>, mesh: Mesh) -> Self {
+        NamedMesh {
+            name,
+            mesh,
+            vertices: None,
+        }
+    }
+
+    /// Welds its vertices; returns how many are gone.
+    pub(crate) fn weld(&mut self) -> usize {
+        let weld = Weld::by_position(&self.mesh.positions);
+        if weld.n_welded() > 0 {
+            let firsts = weld.firsts();
+            self.vertices = Some(match &self.vertices {
+                None => firsts.to_vec(),
+                Some(all) => firsts.iter().map(|&first| all[first as usize]).collect(),
+            });
+            weld.apply(&mut self.mesh);
+        }
+        weld.n_welded()
+    }
 }
 
 /// What a part is called.
@@ -26,8 +57,9 @@ pub(crate) enum PartName<'a> {
 /// Which triangles of a file belong to which part.
 #[derive(Debug, Default)]
 pub(crate) struct Parts {
-    /// The name of each part, and whether the file gave it.
-    names: Vec<(String, bool)>,
+    /// The name of each part, whether the file gave it, and the vertex from which on its vertices
+    /// are counted.
+    names: Vec<(String, bool, u32)>,
     /// The part of each name that a later triangle of this name belongs to.
     known: HashMap<String, usize>,
     /// The first triangle of a run, and the part that it belongs to; ascending.
@@ -36,8 +68,8 @@ pub(crate) struct Parts {
 
 impl Parts {
     /// From triangle `first` on, triangles belong to the part of this name: to a new one, or to the
-    /// one that has it already.
-    pub(crate) fn begin(&mut self, name: PartName<'_>, is_new: bool, first: usize) {
+    /// one that has it already. The vertices of a new one are counted from `base` on.
+    pub(crate) fn begin(&mut self, name: PartName<'_>, is_new: bool, base: u32, first: usize) {
         let (name, is_given) = match name {
             PartName::Given(name) => (name, true),
             PartName::StandIn(name) => (name, false),
@@ -45,7 +77,7 @@ impl Parts {
         let part = match self.known.get(name) {
             Some(&part) if !is_new => part,
             _ => {
-                self.names.push((name.to_owned(), is_given));
+                self.names.push((name.to_owned(), is_given, base));
                 self.known.insert(name.to_owned(), self.names.len() - 1);
                 self.names.len() - 1
             }
@@ -70,7 +102,7 @@ impl Parts {
     pub(crate) fn split(self, mesh: Mesh) -> Vec<NamedMesh> {
         let faces = match &mesh.elements {
             Elements::Triangles(faces) if !self.runs.is_empty() => faces,
-            _ => return vec![NamedMesh { name: None, mesh }],
+            _ => return vec![NamedMesh::whole(None, mesh)],
         };
         let mut of_parts: Vec<(usize, Vec<[u32; 3]>)> = Vec::new();
         let mut places: Vec<Option<usize>> = vec![None; self.names.len()];
@@ -92,32 +124,62 @@ impl Parts {
             of_parts[place].1.extend_from_slice(&faces[first..end]);
         }
         if let [(part, _)] = of_parts[..] {
-            let given = self.names.get(part).filter(|(_, is_given)| *is_given);
-            let name = given.map(|(name, _)| name.clone());
-            return vec![NamedMesh { name, mesh }];
+            let given = self.names.get(part).filter(|(_, is_given, _)| *is_given);
+            let name = given.map(|(name, ..)| name.clone());
+            return vec![NamedMesh::whole(name, mesh)];
         }
-        let mut times: HashMap<&str, u32> = HashMap::new();
+        let mut names = Names::default();
         let mut numbers = vec![0; mesh.positions.len()];
         let bodies = of_parts.into_iter().map(|(part, faces)| {
-            let name = self.names.get(part).map_or("default", |(name, _)| name);
-            let time = times.entry(name).or_default();
-            *time += 1;
-            let name = match *time {
-                1 => name.to_owned(),
-                n => format!("{name} ({n})"),
-            };
+            let named = self.names.get(part);
+            let (name, base) =
+                named.map_or(("default", 0), |(name, _, base)| (name.as_str(), *base));
+            let (mesh, mut vertices) = part_of(&mesh.positions, faces, &mut numbers);
+            for vertex in &mut vertices {
+                *vertex -= base;
+            }
             NamedMesh {
-                name: Some(name),
-                mesh: part_of(&mesh.positions, faces, &mut numbers),
+                name: Some(names.unique(name)),
+                mesh,
+                vertices: Some(vertices),
             }
         });
         bodies.collect()
     }
 }
 
-/// The mesh of these faces and the vertices that they name, in their order. `numbers` has room for
-/// a number per vertex.
-fn part_of(positions: &Positions, mut faces: Vec<[u32; 3]>, numbers: &mut [u32]) -> Mesh {
+/// Names that are in use.
+#[derive(Debug, Default)]
+struct Names {
+    used: HashSet<String>,
+    /// How often each name has been asked for.
+    times: HashMap<String, u32>,
+}
+
+impl Names {
+    /// The name, or `name (2)` and so on if it is in use.
+    fn unique(&mut self, name: &str) -> String {
+        let time = self.times.entry(name.to_owned()).or_default();
+        loop {
+            *time += 1;
+            let own = match *time {
+                1 => name.to_owned(),
+                n => format!("{name} ({n})"),
+            };
+            if self.used.insert(own.clone()) {
+                return own;
+            }
+        }
+    }
+}
+
+/// The mesh of these faces and the vertices that they name, in their order; and these vertices.
+/// `numbers` has room for a number per vertex.
+fn part_of(
+    positions: &Positions,
+    mut faces: Vec<[u32; 3]>,
+    numbers: &mut [u32],
+) -> (Mesh, Vec<u32>) {
     let mut named: Vec<u32> = faces.as_flattened().to_vec();
     named.sort_unstable();
     named.dedup();
@@ -131,8 +193,10 @@ fn part_of(positions: &Positions, mut faces: Vec<[u32; 3]>, numbers: &mut [u32])
         Positions::F32(all) => Positions::F32(named.iter().map(|&v| all[v as usize]).collect()),
         Positions::F64(all) => Positions::F64(named.iter().map(|&v| all[v as usize]).collect()),
     };
-    Mesh {
+    let elements = Elements::Triangles(faces);
+    let mesh = Mesh {
         positions,
-        elements: Elements::Triangles(faces),
-    }
+        elements,
+    };
+    (mesh, named)
 }

@@ -58,9 +58,12 @@ impl<'a> Collector<'a> {
     }
 
     /// The triangles that are added from now on belong to the part of this name, until another one
-    /// begins. With `is_new`, a part of the same name that began before is another one.
-    pub(crate) fn begin_part(&mut self, name: PartName<'_>, is_new: bool) {
-        self.parts.begin(name, is_new, self.triangles.len());
+    /// begins. With `is_new`, a part of the same name that began before is another one. Its
+    /// vertices are counted from `base` on.
+    pub(crate) fn begin_part(&mut self, name: PartName<'_>, is_new: bool, base: usize) {
+        // A file of more vertices is refused.
+        let base = u32::try_from(base).unwrap_or(u32::MAX);
+        self.parts.begin(name, is_new, base, self.triangles.len());
     }
 
     pub(crate) fn n_vertices(&self) -> u64 {
@@ -155,7 +158,7 @@ impl<'a> Collector<'a> {
         let (mesh, mut summary) = self.finish(&whole)?;
         let mut bodies = parts.split(mesh);
         if options.weld {
-            let welded = bodies.iter_mut().map(|body| crate::weld(&mut body.mesh));
+            let welded = bodies.iter_mut().map(NamedMesh::weld);
             summary.n_welded = welded.sum::<usize>() as u64;
         }
         Ok((bodies, summary))

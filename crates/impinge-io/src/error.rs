@@ -4,20 +4,31 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// The name of a file as text for a terminal or a log: control characters, such as line breaks and
-/// the start of escape sequences, are escaped.
+/// the start of escape sequences, are escaped, and so are characters that change the direction of
+/// text.
 ///
 /// ```
 /// assert_eq!(impinge_io::printable("a\n\u{1b}[2J.ply"), r"a\n\u{1b}[2J.ply");
+/// assert_eq!(impinge_io::printable("ylp.\u{202e}"), r"ylp.\u{202e}");
 /// ```
 pub fn printable(name: impl AsRef<Path>) -> String {
     let mut text = String::new();
     for c in name.as_ref().to_string_lossy().chars() {
-        match c.is_control() {
+        match c.is_control() || changes_direction(c) {
             true => text.extend(c.escape_default()),
             false => text.push(c),
         }
     }
     text
+}
+
+/// Marks, embeddings, overrides and isolates of bidirectional text, and separators of lines and
+/// paragraphs, which end them (Unicode Standard Annex 9).
+fn changes_direction(c: char) -> bool {
+    matches!(
+        c,
+        '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}'
+    )
 }
 
 /// The extensions of files of rows of numbers, for messages.

@@ -70,7 +70,7 @@ pub use error::{Error, Location, Place, printable};
 pub use format::Format;
 pub use mesh::{Elements, Mesh, Positions, Weld, weld};
 pub use npy::{NpyHeader, npy_header};
-pub use numbers::{read_points, read_rows};
+pub use numbers::{read_points, read_rows, read_rows_bytes};
 pub use options::{Prefer, ReadOptions, Summary, grouped};
 pub use read::{
     read, read_bodies, read_bodies_bytes, read_bytes, read_bytes_with_summary, read_tetgen_bytes,

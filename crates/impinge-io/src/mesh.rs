@@ -179,6 +179,12 @@ impl Weld {
         self.0.map()
     }
 
+    /// For each vertex after the welding, the first vertex before it that is at its position;
+    /// ascending.
+    pub fn firsts(&self) -> &[u32] {
+        self.0.firsts()
+    }
+
     /// Welds the mesh that this welding was computed from: its vertices, and the indices of its
     /// elements.
     pub fn apply(&self, mesh: &mut Mesh) {

@@ -47,6 +47,18 @@ pub fn read_rows<const N: usize>(
     }
 }
 
+/// Like [`read_rows`], from bytes: a NumPy array if they begin as one, else text. Errors use `name`
+/// for the file.
+///
+/// # Errors
+/// As [`read_rows`].
+pub fn read_rows_bytes<const N: usize>(bytes: &[u8], name: &str) -> Result<Vec<[f64; N]>, Error> {
+    match bytes.starts_with(b"\x93NUMPY") {
+        true => array(bytes, Name(name)),
+        false => lines(bytes, Name(name)),
+    }
+}
+
 /// Reads points: rows of three numbers, as [`read_rows`], or the vertices of a mesh file, which
 /// needs no faces. Vertices keep their order and are never welded.
 ///

@@ -84,6 +84,35 @@ fn objects_of_one_name_stay_apart() {
 }
 
 #[test]
+fn no_two_bodies_have_one_name() {
+    let bodies = obj(&format!(
+        "{VERTICES}o a\nf 1 2 3\no a (2)\nf 1 3 4\no a\nf 1 2 6\no a (2)\nf 2 3 6\n"
+    ));
+    let expected = ["a", "a (2)", "a (3)", "a (2) (2)"];
+    assert_eq!(names(&bodies), expected.map(Some));
+}
+
+#[test]
+fn vertices_of_bodies_have_the_numbers_of_the_file() {
+    let text = format!("{VERTICES}v 0 0 0\no a\nf 1 3 7\no b\nf 6 3 4\n");
+    let [a, b] = &obj(&text)[..] else {
+        panic!("two bodies");
+    };
+    assert_eq!(a.vertices.as_deref(), Some(&[0, 2, 6][..]));
+    assert_eq!(b.vertices.as_deref(), Some(&[2, 3, 5][..]));
+    // Of welded ones, the first.
+    let weld = ReadOptions::default();
+    let read = |text: &str| read_bodies_bytes(text.as_bytes(), Format::Obj, "a.obj", &weld);
+    let (bodies, _) = read(&text).unwrap();
+    assert_eq!(bodies[0].vertices.as_deref(), Some(&[0, 2][..]));
+    // A file of one body has its own vertices.
+    assert_eq!(obj(&format!("{VERTICES}o a\nf 1 2 3\n"))[0].vertices, None);
+    let (bodies, _) = read(&format!("{VERTICES}v 0 0 0\nv 2 2 2\nf 1 3 8\n")).unwrap();
+    let whole = [0, 1, 2, 3, 4, 5, 7];
+    assert_eq!(bodies[0].vertices.as_deref(), Some(&whole[..]));
+}
+
+#[test]
 fn what_has_no_parts_is_one_body() {
     for (text, name) in [
         ("f 1 2 3\nf 1 3 4\n", None),

@@ -151,7 +151,7 @@ pub fn read(
     let (mesh, summary) = read.map_err(refuse)?;
     let name = path.display().to_string();
     let n_welded = usize::try_from(summary.n_welded).unwrap_or(usize::MAX);
-    let mesh = NamedMesh { name: None, mesh };
+    let mesh = NamedMesh::whole(None, mesh);
     to_python(py, mesh, &name, n_welded, &summary)
 }
 
@@ -233,7 +233,7 @@ fn to_python(
     n_welded: usize,
     summary: &Summary,
 ) -> PyResult<Mesh> {
-    let NamedMesh { name, mesh } = body;
+    let NamedMesh { name, mesh, .. } = body;
     let positions: impinge::Positions = match mesh.positions {
         Positions::F32(positions) => positions.into(),
         Positions::F64(positions) => positions.into(),

@@ -47,7 +47,9 @@ pub fn read_bodies(name: &str, bytes: &[u8], weld: bool) -> Result<Vec<FileMesh>
     let format = Format::from_name(name)?;
     let (bodies, summary) = read_bodies_bytes(bytes, format, name, &options())?;
     let bodies = bodies.into_iter().map(|body| {
-        let NamedMesh { name: own, mesh } = body;
+        let NamedMesh {
+            name: own, mesh, ..
+        } = body;
         FileMesh::new(own.as_deref().unwrap_or(name), mesh, &summary, weld)
     });
     Ok(bodies.collect())

@@ -42,7 +42,8 @@ red what touches then, yellow what touches at the end.",
         text: "\
 Without --rows-format the name of the file decides: .csv, .jsonl, .npy or .parquet; standard output is CSV. If the rows go to
 standard output, the summary goes to standard error. Rows are sorted. Bodies are numbered from 0 as given,
-vertices and faces as in the file; edges are the unique pairs (low, high) of vertices in the order of (high, low).
+vertices and faces as in the file, welded vertices as the first of them; edges are the unique pairs (low, high) of vertices
+in the order of (high, low). Faces of tetrahedra are those of the surface, by tetrahedron, then by the opposite corner.
 Columns of numbers alone are a plain array in .npy files, others a structured one.
 
 `pairs`, `self`: body_a, element_a, body_b, element_b
@@ -54,7 +55,7 @@ Columns of numbers alone are a plain array in .npy files, others a structured on
 `probe`: point, element, feature, distance, x, y, z, with --signed then place: inside, on or outside, and the distance is
   negative outside. Distances are rounded down. The nearest point is one column, nearest, in .jsonl and .npy files. With
   --nearest K up to K rows per point, nearest first. --locate adds a last column: tetrahedron, -1 for none.
-`safe`: body, vertex, safe: how far it may move, rounded down
+`safe`: body, vertex, safe: how far it may move, rounded down; a row per vertex of the file
 `cast`: ray, element, feature, t, t_end, b0, b1, b2 (barycentrics in .jsonl and .npy files); with --hits any: ray, hit
 `step`: kind, body_a, element_a, body_b, element_b, toi. Of kind vf, a is the vertex and b the face. Mesh files
   hold faces, so kinds are vf and ee; ev and vv are of bodies of edges or points, which the library and the
@@ -64,7 +65,8 @@ Columns of numbers alone are a plain array in .npy files, others a structured on
   them: see --memory-budget
 --contacts of `pairs` and `self`: one row per corner of the intersection of two triangles, which is a point, the
   two ends of a segment, or the corners of a polygon if both lie in one plane. feature_a and feature_b say
-  where the corner lies in each triangle: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).
+  where the corner lies in each triangle: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3). In .npy files a shape is
+  1 (point), 2 (segment) or 3 (polygon); kind_a and kind_b are 0 (vertex), 1 (edge) or 2 (face), beside two numbers.
 --regions of `pairs` and `self`: body_a, body_b, contacts, x, y, z, low_x, …, high_z, length, patch_area, area_x, area_y,
   area_z, nx, ny, nz, depth, volume, inside_a, inside_b. A region is connected contacts of two bodies: how many, its
   middle, its box, the length of its curves, the area in common planes, the area that the curves span. Push body a along

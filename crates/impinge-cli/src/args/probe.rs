@@ -36,7 +36,8 @@ pub struct ProbeArgs {
     /// A mesh file
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// The points: rows of three numbers (.csv, .txt, .xyz or .npy), or the vertices of a mesh file
+    /// The points: rows of three numbers (.csv, .txt, .xyz, .npy, or "-" for standard input), or the
+    /// vertices of a mesh file
     #[arg(long, value_name = "FILE", required = true)]
     pub points: PathBuf,
     /// Also decide whether each point is inside, on the surface or outside; distances are then
@@ -65,7 +66,8 @@ pub struct CastArgs {
     /// A mesh file
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// The rays: rows of six numbers, origin and direction (.csv, .txt, .xyz or .npy)
+    /// The rays: rows of six numbers, origin and direction (.csv, .txt, .xyz, .npy, or "-" for
+    /// standard input)
     #[arg(long, value_name = "FILE", required = true)]
     pub rays: PathBuf,
     /// What is found of each ray

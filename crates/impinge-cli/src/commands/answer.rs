@@ -70,10 +70,20 @@ fn answer(
     }
     let holds_no_pairs = answer.count || answer.any;
     let is_one_frame = answer.repeat.get() == 1;
-    if holds_no_pairs && (rows_file.is_some() || !answer.outputs().is_empty() || !is_one_frame) {
-        let option = if answer.count { "--count" } else { "--any" };
-        let text = format!("{option} holds no pairs: there is nothing to write, and one frame");
-        return Err(Error::Usage(text));
+    if holds_no_pairs {
+        let does = match answer.count {
+            true => "--count counts pairs and keeps none",
+            false => "--any stops at the first pair and keeps none",
+        };
+        let written = answer.outputs().first().map(|(option, _)| *option);
+        let written = rows_file.as_ref().map(|_| "--rows").or(written);
+        let text = match written {
+            Some(option) => format!("{does}: there is nothing for {option} to write"),
+            None => format!("{does}: --repeat is for questions that do"),
+        };
+        if written.is_some() || !is_one_frame {
+            return Err(Error::Usage(text));
+        }
     }
     let mut loading = Loading::new(ask, asked.within, cancel);
     if asked.between {
@@ -84,9 +94,12 @@ fn answer(
         ids,
         names,
         vertices,
+        origins,
         nouns,
         unread,
     } = read(paths, loading)?;
+    // Only they name vertices.
+    let origins = answer.contacts.is_some().then_some(origins);
     let is_read = |(ix, _): &(usize, _)| unread.iter().all(|(body, _)| body != ix);
     let read = vertices.iter().copied().enumerate().filter(is_read);
     let read: Vec<Vertices> = read.map(|(_, of)| of).collect();
@@ -171,8 +184,8 @@ fn answer(
         None
     };
     if let Some((found, curves)) = &met {
-        if let Some(file) = &answer.contacts {
-            contacts::write(file, found)?;
+        if let (Some(file), Some(origins)) = (&answer.contacts, &origins) {
+            contacts::write(file, origins, found)?;
         }
         if let Some(file) = &answer.curves {
             contacts::write_curves(file, found, curves)?;

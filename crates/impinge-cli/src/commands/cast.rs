@@ -9,9 +9,9 @@ use crate::apart::Inputs;
 use crate::args::CastArgs;
 use crate::detection::hit;
 use crate::error::Error;
-use crate::one_mesh::OneMesh;
+use crate::one_mesh::{OneMesh, rows_of_stdin};
 use crate::output::{how_alone, say};
-use crate::text::{counted, grouped, hex};
+use crate::text::{counted, exactly, grouped, hex};
 use crate::values::RowsFile;
 use crate::watch::go_on;
 use crate::{report, rows};
@@ -20,9 +20,13 @@ use crate::{report, rows};
 pub fn cast(args: &CastArgs, cancel: &CancelToken) -> Result<(), Error> {
     let inputs = Inputs::new([&args.mesh, &args.rays]);
     let rows_file = args.rows.file(&inputs, args.how.json)?;
+    let of_stdin = rows_of_stdin("--rays -", &args.rays, &args.mesh)?;
     let mesh = OneMesh::read(&args.mesh, &args.how, cancel)?;
     go_on(cancel)?;
-    let rays: Vec<[f64; 6]> = read_rows(&args.rays, &ReadOptions::as_they_are())?;
+    let rays: Vec<[f64; 6]> = match of_stdin {
+        Some(rays) => rays,
+        None => read_rows(&args.rays, &ReadOptions::as_they_are())?,
+    };
     let (origins, directions): (Vec<_>, Vec<_>) = rays
         .iter()
         .map(|&[x, y, z, dx, dy, dz]| ([x, y, z], [dx, dy, dz]))
@@ -137,7 +141,7 @@ impl Answer<'_> {
         let (n_hit, hash) = (grouped(self.n_hit()), hex(self.hits.hash()));
         writeln!(to, "{subject}: {n_hit} of {rays} hit it{all}, hash {hash}")?;
         if let Some((ray, hit)) = self.nearest() {
-            let (element, t) = (hit.element.element, hit.t);
+            let (element, t) = (hit.element.element, exactly(hit.t));
             writeln!(to, "nearest: ray {ray} hits element {element} at t {t}")?;
         }
         let stats = self.hits.stats();

@@ -12,10 +12,12 @@ use crate::error::Error;
 use crate::load::{Bodies, Loading};
 use crate::output::out;
 use crate::report;
+use crate::text::exactly;
 
 /// `impinge distance`.
 pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> {
     let loading = Loading::as_they_are(!args.json, cancel)
+        .asked(Some(false), false, args.format)
         .with_bodies(args.bodies)
         .splitting_one();
     let Bodies {
@@ -60,12 +62,13 @@ pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> 
     }
     let mut to = out();
     let than = match (args.below, is_below) {
-        (Some(limit), Some(true)) => format!(", less than {limit}"),
-        (Some(limit), _) => format!(", not less than {limit}"),
+        (Some(limit), Some(true)) => format!(", less than {}", exactly(limit)),
+        (Some(limit), _) => format!(", not less than {}", exactly(limit)),
         _ => String::new(),
     };
-    writeln!(to, "distance {distance}{than}")?;
-    for ((body, element), [x, y, z]) in bodies.into_iter().zip(elements).zip(points) {
+    writeln!(to, "distance {}{than}", exactly(distance))?;
+    for ((body, element), point) in bodies.into_iter().zip(elements).zip(points) {
+        let [x, y, z] = point.map(exactly);
         let name = printable(&names[body]);
         writeln!(to, "element {element} of {name} at {x} {y} {z}")?;
     }

@@ -55,7 +55,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     // Files are written first: if one can't be written, no answer is printed that looks like
     // success.
     if let Some(file) = &rows_file {
-        rows::write_near(file, near)?;
+        rows::write_near(file, &bodies.origins, near)?;
     }
     let named = bodies.names.iter().map(String::as_str);
     let named: Vec<(BodyId, &str)> = bodies.ids.iter().copied().zip(named).collect();
@@ -120,7 +120,7 @@ fn answer(
         pairs: near.len(),
         kinds: report::Kinds::new(|kind| near.of(kind).len() as u64),
         intersects,
-        hash: hex(near.hash()),
+        hash: hex(bodies.origins.hash_of_near(near)),
         bodies: described.collect::<Result<_, _>>()?,
         how: report::How::new(near.stats(), report::Stages::new(&times)),
     })
@@ -148,7 +148,7 @@ fn print(
             "{subject}: {} of elements within {distance} ({}), hash {}",
             counted(near.len() as u64, "pair"),
             text::kinds(counts(near)),
-            hex(near.hash())
+            hex(bodies.origins.hash_of_near(near))
         )?;
     }
     let command = match (bodies.ids.len(), args.within) {

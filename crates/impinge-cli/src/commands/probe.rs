@@ -10,9 +10,9 @@ use crate::apart::Inputs;
 use crate::args::ProbeArgs;
 use crate::detection::Times;
 use crate::error::Error;
-use crate::one_mesh::OneMesh;
+use crate::one_mesh::{OneMesh, rows_of_stdin};
 use crate::output::{how_alone, say};
-use crate::text::{counted, grouped, hex};
+use crate::text::{counted, exactly, grouped, hex};
 use crate::values::RowsFile;
 use crate::watch::go_on;
 use crate::{report, rows};
@@ -21,9 +21,13 @@ use crate::{report, rows};
 pub fn probe(args: &ProbeArgs, cancel: &CancelToken) -> Result<(), Error> {
     let inputs = Inputs::new([&args.mesh, &args.points]);
     let rows_file = args.rows.file(&inputs, args.how.json)?;
+    let of_stdin = rows_of_stdin("--points -", &args.points, &args.mesh)?;
     let mesh = OneMesh::read(&args.mesh, &args.how, cancel)?;
     go_on(cancel)?;
-    let points = read_points(&args.points, &ReadOptions::as_they_are())?;
+    let points = match of_stdin {
+        Some(points) => points,
+        None => read_points(&args.points, &ReadOptions::as_they_are())?,
+    };
     let mut detector = mesh.detector(&args.how, cancel)?;
     let scene = mesh.scene();
     // First what may be refused.
@@ -211,14 +215,15 @@ impl Answer<'_> {
             None => points.clone(),
             Some(most) => {
                 let near = self.found().count() as u64;
-                format!("{} of {points} within {most}", grouped(near))
+                format!("{} of {points} within {}", grouped(near), exactly(most))
             }
         };
         let hash = hex(self.closest.hash());
         writeln!(to, "{subject}: {within}, hash {hash}")?;
         if let Some(both) = self.extremes() {
             for (name, (point, found)) in ["nearest", "farthest"].into_iter().zip(both) {
-                let ([x, y, z], distance) = (found.point, found.distance);
+                let [x, y, z] = found.point.map(exactly);
+                let distance = exactly(found.distance);
                 let element = found.element.element;
                 writeln!(
                     to,

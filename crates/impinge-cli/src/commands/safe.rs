@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::load::{Bodies, Loading};
 use crate::output::{say, stage_table};
 use crate::picture::Drawer;
-use crate::text::{counted, grouped};
+use crate::text::{counted, exactly, grouped};
 use crate::watch::Watch;
 use crate::{colors, headline, output, palette, report, rows};
 
@@ -69,7 +69,12 @@ pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
         let each = answer.bounds();
         let row =
             |(body, vertex, bound)| [rows::number(body), rows::number(vertex), Cell::Float(bound)];
-        rows::write(file, columns.to_vec(), safe.n_vertices(), each.map(row))?;
+        rows::write(
+            file,
+            columns.to_vec(),
+            answer.bounds().count(),
+            each.map(row),
+        )?;
     }
     let named = bodies.names.iter().map(String::as_str);
     let named: Vec<(BodyId, &str)> = bodies.ids.iter().copied().zip(named).collect();
@@ -127,12 +132,14 @@ impl Answer<'_> {
         }
     }
 
-    /// The number of the body, the vertex and its bound.
+    /// The number of the body, the vertex as its file numbers it, and its bound.
     fn bounds(&self) -> impl Iterator<Item = (usize, usize, f64)> {
         let bodies = self.bodies.ids.iter().enumerate();
         bodies.flat_map(|(number, &id)| {
             let bounds = self.of(id);
-            (0..bounds.len()).map(move |vertex| (number, vertex, bounds.get(vertex)))
+            let origin = self.bodies.origins.of(number).into_iter();
+            let vertices = origin.flat_map(move |origin| origin.vertices(bounds.len()));
+            vertices.map(move |(in_file, vertex)| (number, in_file, bounds.get(vertex)))
         })
     }
 
@@ -191,7 +198,7 @@ impl Answer<'_> {
     fn print(&self, to: &mut impl Write) -> Result<(), Error> {
         let Bodies { nouns, names, .. } = self.bodies;
         let subject = headline::subject(nouns, names);
-        let most = self.args.most;
+        let most = exactly(self.args.most);
         let n = grouped(self.moving().count() as u64);
         let (n_bounded, smallest) = (self.n_bounded(), self.smallest());
         match smallest.filter(|_| n_bounded > 0) {
@@ -203,8 +210,9 @@ impl Answer<'_> {
                 };
                 writeln!(
                     to,
-                    "{subject}: {} of {n} vertices may move by less than {most}, vertex {vertex}{of} by {bound:?} at most",
-                    grouped(n_bounded as u64)
+                    "{subject}: {} of {n} vertices may move by less than {most}, vertex {vertex}{of} by {} at most",
+                    grouped(n_bounded as u64),
+                    exactly(bound)
                 )?;
             }
         }

@@ -2,6 +2,7 @@
 
 use std::io::{Write, stderr};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use impinge::{BodyId, CancelToken, Control, Pairs, Precision, Scene};
 use impinge_io::{Cell, ELEMENTS, Sequence, Weld, impact_columns, printable};
@@ -53,6 +54,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         ids,
         names,
         vertices,
+        origins,
         nouns,
         ..
     } = bodies;
@@ -100,7 +102,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             rows: file.as_ref().map(create).transpose()?,
         };
         let steps = steps_of_sequence(
-            (&mut detector, &mut scene, moving),
+            (&mut detector, &mut scene, moving, &origins),
             &args.step.of(query),
             &mut frames,
             range,
@@ -263,7 +265,7 @@ pub(super) struct Frames {
     sequence: Sequence,
     /// Frames before which others are missing.
     after_gaps: Vec<usize>,
-    weld: Option<Weld>,
+    weld: Option<Arc<Weld>>,
     name: String,
     /// Whether frames that are passed over get a line of JSON.
     json: bool,
@@ -276,7 +278,7 @@ impl Frames {
         sequence: Sequence,
         name: &Path,
         mesh: &Path,
-        weld: Option<Weld>,
+        weld: Option<Arc<Weld>>,
         json: bool,
     ) -> Result<Self, Error> {
         sequence.check_faces(mesh)?;
@@ -361,7 +363,7 @@ pub(super) fn welded(
 impl step::Frames for Frames {
     fn read(&self, frame_ix: usize) -> Result<impinge::Positions, Error> {
         let positions = self.sequence.frame(frame_ix)?;
-        welded(positions, self.weld.as_ref(), &self.name, frame_ix)
+        welded(positions, self.weld.as_deref(), &self.name, frame_ix)
     }
 
     fn refused(&self, frame_ix: usize, source: impinge::Error) -> Error {

@@ -75,7 +75,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
             .map_err(|error| bodies.named(error))?;
         drop(watch);
         reached::write(&args.truncate, &bodies, |id| truncation.positions(id))?;
-        let found = Found::truncation(earliest, &truncation, detector.stats());
+        let found = Found::truncation(&bodies.origins, earliest, &truncation, detector.stats());
         print(args, asked, &bodies, &found, None)?;
         return found.end(args.fail_on_hit);
     }
@@ -85,7 +85,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
             .map_err(|error| bodies.named(error))?;
         drop(watch);
         reached::write(&args.advance, &bodies, |id| advance.positions(id))?;
-        let found = Found::advance(&advance, detector.stats());
+        let found = Found::advance(&bodies.origins, &advance, detector.stats());
         print(args, asked, &bodies, &found, None)?;
         return found.end(args.fail_on_hit);
     }
@@ -103,7 +103,13 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         let earliest = detector.earliest(&bodies.scene, &step)?;
         let start_intersects = detector.start_intersects();
         drop(watch);
-        let found = Found::first(earliest, start_intersects, detector.stats(), times);
+        let found = Found::first(
+            &bodies.origins,
+            earliest,
+            start_intersects,
+            detector.stats(),
+            times,
+        );
         print(args, asked, &bodies, &found, None)?;
         return found.end(args.fail_on_hit);
     }
@@ -113,7 +119,8 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     // success.
     if let Some(file) = &rows_file {
         let columns = impact_columns(args.how.precision == Precision::F64);
-        let rows = impacts.iter().map(rows::impact);
+        let rows = impacts.iter();
+        let rows = rows.map(|impact| rows::impact(&bodies.origins, impact));
         rows::write(file, columns, impacts.len(), rows)?;
     }
     let named = bodies.names.iter().map(|[start, _]| start.as_str());
@@ -125,7 +132,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     if let Some(file) = &args.shown.out {
         colors::write(file, &bodies.scene, &named, color)?;
     }
-    let found = Found::all(impacts, times);
+    let found = Found::all(&bodies.origins, impacts, times);
     print(args, asked, &bodies, &found, rows_file.as_ref())?;
     if let Some(png) = &args.shown.png {
         let surfaces = colors::surfaces(&bodies.scene, &named, color)?;

@@ -412,7 +412,7 @@ fn pairs_are_limited_counted_and_asked_for() {
         ] {
             let arguments = ["self", "pile.obj", option];
             let said = folder.run(arguments.iter().chain(others)).misuse();
-            assert!(said.contains(option), "{said}");
+            assert!(said.contains(option) && said.contains(others[0]), "{said}");
         }
     }
     folder

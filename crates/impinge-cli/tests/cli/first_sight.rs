@@ -259,7 +259,7 @@ fn pairs_and_meshes_go_through_pipes() {
         .run(["self", "boxes.ply", "--rows", "-", "--json"])
         .misuse();
 
-    let piped = |args: &[&str]| -> Run {
+    let given = |args: &[&str], bytes: &[u8]| -> Run {
         let mut child = folder
             .command(args)
             .stdin(Stdio::piped())
@@ -267,11 +267,12 @@ fn pairs_and_meshes_go_through_pipes() {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        let bytes = std::fs::read(folder.path("boxes.ply")).unwrap();
         // A run that ends with an error does not read its input.
-        let _ = child.stdin.take().unwrap().write_all(&bytes);
+        let _ = child.stdin.take().unwrap().write_all(bytes);
         child.wait_with_output().unwrap().into()
     };
+    let boxes = std::fs::read(folder.path("boxes.ply")).unwrap();
+    let piped = |args: &[&str]| given(args, &boxes);
     let text = piped(&["self", "-", "--format", "ply", "--rows", "in.csv"]).printed();
     assert!(text.starts_with("standard input: "), "{text}");
     assert_eq!(csv_rows(&folder.path("in.csv")), rows);
@@ -288,6 +289,28 @@ fn pairs_and_meshes_go_through_pipes() {
     );
     let line = piped(&["self", "-", "--format", "off"]).error();
     assert!(line.starts_with("standard input"), "{line}");
+
+    let text = piped(&["distance", "-", "boxes.ply", "--format", "ply"]).printed();
+    assert!(text.starts_with("distance 0\n"), "{text}");
+    let misuse = piped(&["step", "-", "boxes.ply"]).misuse();
+    assert!(misuse.contains("`step` reads files"), "{misuse}");
+    // Points and rays are rows of numbers, as text or as an array.
+    let probe = ["probe", "boxes.ply", "--points", "-", "--rows", "-"];
+    let run = given(&probe, b"x,y,z\n9,9,9\n");
+    assert_eq!(run.stdout.lines().count(), 2, "{}", run.stderr);
+    let mut array = b"\x93NUMPY\x01\x00\x46\x00".to_vec();
+    let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 3), }";
+    array.extend(format!("{header:<69}\n").bytes());
+    array.extend([9.0f32; 3].map(f32::to_le_bytes).as_flattened());
+    let same = given(&probe, &array);
+    assert_eq!(same.stdout, run.stdout, "{}", same.stderr);
+    let cast = ["cast", "boxes.ply", "--rays", "-", "--json"];
+    assert_eq!(given(&cast, b"9 9 9 1 0 0\n").json()["rays"], 1);
+    let line = given(&cast, b"9 9 9\n").error();
+    let expected = "standard input:1: expected 6 numbers in a row, found 3";
+    assert!(line.starts_with(expected), "{line}");
+    let both = ["cast", "-", "--format", "ply", "--rays", "-"];
+    assert!(piped(&both).misuse().contains("standard input already"));
 }
 
 #[test]

@@ -24,3 +24,4 @@ mod signals;
 mod step;
 mod tiles;
 mod usage;
+mod vertices;

@@ -98,8 +98,13 @@ impl Candidates {
 
     /// The hash of the candidates of one kind; [`hash`](Candidates::hash) is the sum of these.
     pub fn hash_of(&self, kind: PairKind) -> u64 {
-        let rows = self.rows(kind);
-        rows.fold(0, |sum: u64, row| {
+        Self::hash_rows(kind, self.rows(kind))
+    }
+
+    /// The hash of candidates of one kind that have these rows.
+    #[doc(hidden)]
+    pub fn hash_rows(kind: PairKind, rows: impl IntoIterator<Item = [u32; 4]>) -> u64 {
+        rows.into_iter().fold(0, |sum: u64, row| {
             sum.wrapping_add(mix(hash_row(row) ^ kind as u64))
         })
     }

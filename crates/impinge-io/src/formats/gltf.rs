@@ -241,7 +241,8 @@ impl<'a> Scene<'a, '_> {
                 let named = named.filter(|name| !name.is_empty());
                 let stand_in = format!("node {node_ix}");
                 let named = named.map_or(PartName::StandIn(&stand_in), PartName::Given);
-                self.parts.begin_part(named, true);
+                let base = self.f32s.len() + self.f64s.len();
+                self.parts.begin_part(named, true, base);
                 let weights = node.weights.as_ref().unwrap_or(&mesh.weights);
                 if node.skin.is_some() || weights.iter().any(|&weight| weight != 0.0) {
                     self.parts.n_at_rest += 1;

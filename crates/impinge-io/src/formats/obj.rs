@@ -103,7 +103,8 @@ fn statements<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> 
                         false => PartName::Given(&name),
                     };
                     // A group may go on later; each `o` begins another object.
-                    parts.begin_part(name, has_objects);
+                    // All share one list of vertices.
+                    parts.begin_part(name, has_objects, 0);
                 }
             }
             Some(b"l") => parts.n_lines += 1,

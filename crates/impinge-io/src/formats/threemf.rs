@@ -90,6 +90,7 @@ pub(crate) fn read<'a>(
         out.begin_part(
             named.map_or(PartName::StandIn(&stand_in), PartName::Given),
             true,
+            points.len(),
         );
         package.place(&part, item, item.transform, 0, &mut points, &mut out)?;
     }

@@ -1,8 +1,8 @@
 //! A body of a step with its vertices welded: those at one position at the start and at one
 //! position at the end become one.
 //!
-//! Vertices are numbered in the answer, and the number of a welded vertex depends on all vertices
-//! before it. So a body is welded as a whole before it is scattered, not tile by tile.
+//! The answer numbers vertices, a welded one as the first at its position in the file. So a body is
+//! welded as a whole before it is scattered, not tile by tile.
 
 use super::Source;
 use crate::chunk::{Chunk, Shape};
@@ -10,14 +10,16 @@ use crate::error::Error;
 
 pub struct Welded {
     source: Box<dyn Source>,
-    /// The welded vertex of each vertex of the source.
-    map: Vec<u32>,
+    /// The first vertex of the source at the position of each.
+    firsts: Vec<u32>,
 }
 
 impl Welded {
     pub fn new(source: Box<dyn Source>) -> Result<Self, Error> {
-        let map = source.weld()?.map().to_vec();
-        Ok(Welded { source, map })
+        let weld = source.weld()?;
+        let first = |&welded: &u32| weld.firsts()[welded as usize];
+        let firsts = weld.map().iter().map(first).collect();
+        Ok(Welded { source, firsts })
     }
 }
 
@@ -41,7 +43,7 @@ impl Source for Welded {
     fn read(&self, first: u64, n: usize) -> Result<Option<Chunk>, Error> {
         let mut chunk = self.source.read(first, n)?;
         for vertex in chunk.iter_mut().flat_map(|chunk| &mut chunk.vertices) {
-            *vertex = self.map[*vertex as usize];
+            *vertex = self.firsts[*vertex as usize];
         }
         Ok(chunk)
     }

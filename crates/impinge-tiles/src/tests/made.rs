@@ -189,8 +189,8 @@ pub fn step_oracle(bodies: &[[Mesh; 2]], options: &PlanOptions, ask: Ask) -> Imp
         let (mut start, mut end) = (start.clone(), end.clone());
         if options.weld {
             let weld = Weld::by_position(&start.positions).and(&Weld::by_position(&end.positions));
-            weld.apply(&mut start);
-            weld.apply(&mut end);
+            name_firsts(&weld, &mut start);
+            name_firsts(&weld, &mut end);
         }
         let id = add(&mut scene, &start);
         match &end.positions {
@@ -228,6 +228,17 @@ pub fn run(plan: &Plan, ask: Ask) -> Result<(), crate::Error> {
         again: false,
     };
     plan.run(0..plan.n_tiles(), &options, Control::new(), &mut |_| {})
+}
+
+/// Has elements name the first of welded vertices, and keeps the numbers of all.
+fn name_firsts(weld: &Weld, mesh: &mut Mesh) {
+    let indices = match &mut mesh.elements {
+        Elements::Triangles(faces) => faces.as_flattened_mut(),
+        Elements::Tetrahedra(tets) => tets.as_flattened_mut(),
+    };
+    for ix in indices {
+        *ix = weld.firsts()[weld.map()[*ix as usize] as usize];
+    }
 }
 
 /// All steps.

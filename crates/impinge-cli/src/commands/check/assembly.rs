@@ -113,7 +113,8 @@ fn parts(path: &Path, are_several: bool) -> Result<Vec<(String, Mesh)>, Error> {
     }
     let (bodies, summary) = read_bodies(path, &options)?;
     tell(&file, &summary.notes());
-    Ok(named_parts(&file, bodies, are_several).collect())
+    let parts = named_parts(&file, bodies, are_several);
+    Ok(parts.map(|(name, part)| (name, part.mesh)).collect())
 }
 
 fn report(args: &CheckArgs, names: &[String], answer: &Assembly) -> report::Assembly {

@@ -8,7 +8,8 @@ use impinge_io::printable;
 use crate::args::StepHow;
 use crate::asked::{Asked, kept};
 use crate::detection::{Times, hit};
-use crate::text::{self, counted, grouped, hex};
+use crate::origins::Origins;
+use crate::text::{self, counted, exactly, grouped, hex};
 use crate::{output, report};
 
 use super::load::Moving;
@@ -23,10 +24,12 @@ const KINDS: [PairKind; 4] = [
 
 /// The answer: all impacts, or only the first one.
 pub struct Found<'a> {
+    /// With vertices as files number them.
     earliest: Option<Impact>,
     /// Whether elements intersect at the start, if that was asked.
     start_intersects: Option<bool>,
     all: Option<&'a Impacts>,
+    origins: &'a Origins,
     /// The part of the step that can be taken, if that was asked.
     fraction: Option<f64>,
     /// How many vertices were stopped, how many pairs touch at the start, and in how many rounds
@@ -38,28 +41,26 @@ pub struct Found<'a> {
 
 impl<'a> Found<'a> {
     /// `earlier` has the times of the same question, asked before.
-    pub fn all(impacts: &'a Impacts, earlier: Times) -> Self {
+    pub fn all(origins: &'a Origins, impacts: &'a Impacts, earlier: Times) -> Self {
+        let (earliest, start) = (impacts.earliest(), impacts.start_intersects());
         Found {
-            earliest: impacts.earliest(),
-            start_intersects: impacts.start_intersects(),
             all: Some(impacts),
-            fraction: None,
-            truncated: None,
-            stats: impacts.stats(),
-            times: earlier.and(impacts.stats()),
+            ..Found::first(origins, earliest, start, impacts.stats(), earlier)
         }
     }
 
     pub fn first(
+        origins: &'a Origins,
         earliest: Option<Impact>,
         start_intersects: Option<bool>,
         stats: &'a Stats,
         earlier: Times,
     ) -> Self {
         Found {
-            earliest,
+            earliest: earliest.map(|impact| origins.impact(impact)),
             start_intersects,
             all: None,
+            origins,
             fraction: None,
             truncated: None,
             stats,
@@ -67,10 +68,11 @@ impl<'a> Found<'a> {
         }
     }
 
-    pub fn advance(advance: &Advance, stats: &'a Stats) -> Self {
+    pub fn advance(origins: &'a Origins, advance: &Advance, stats: &'a Stats) -> Self {
         Found {
             fraction: Some(advance.fraction),
             ..Found::first(
+                origins,
                 advance.first,
                 advance.start_intersects,
                 stats,
@@ -79,12 +81,17 @@ impl<'a> Found<'a> {
         }
     }
 
-    pub fn truncation(earliest: Option<Impact>, truncation: &Truncation, stats: &'a Stats) -> Self {
+    pub fn truncation(
+        origins: &'a Origins,
+        earliest: Option<Impact>,
+        truncation: &Truncation,
+        stats: &'a Stats,
+    ) -> Self {
         let (n_cut, n_touching) = (truncation.n_cut(), truncation.n_touching());
         let start = truncation.start_intersects();
         Found {
             truncated: Some((n_cut, n_touching, truncation.rounds())),
-            ..Found::first(earliest, start, stats, Times::default())
+            ..Found::first(origins, earliest, start, stats, Times::default())
         }
     }
 
@@ -123,6 +130,11 @@ impl<'a> Found<'a> {
         })
     }
 
+    /// The hash of all impacts as they are written.
+    pub fn hash(&self) -> Option<String> {
+        self.all.map(|all| hex(self.origins.hash_of_impacts(all)))
+    }
+
     /// What the lines of a sequence say too.
     pub fn found(&self) -> report::Found {
         let n = |all: &Impacts| report::KindsOfStep::new(|kind| all.of(kind).len() as u64);
@@ -133,7 +145,7 @@ impl<'a> Found<'a> {
             kinds: self.all.map(n),
             touching_at_start: self.all.map(n_at_start),
             start_intersects: self.start_intersects,
-            hash: self.all.map(|all| hex(all.hash())),
+            hash: self.hash(),
             backend: self.stats.backend.as_str().to_owned(),
             method: self.stats.method,
         }
@@ -157,7 +169,8 @@ impl<'a> Found<'a> {
         let name = |body: impinge::BodyId| printable(&bodies.names[body.index()][0]);
         let nothing = if clearance > 0.0 {
             format!(
-                "every pair keeps its clearance of {clearance}{besides} from start to end, or a fifth of its distance"
+                "every pair keeps its clearance of {}{besides} from start to end, or a fifth of its distance",
+                exactly(clearance)
             )
         } else if let Some(kept) = &kept {
             format!("nothing comes within {kept} from start to end")
@@ -186,6 +199,7 @@ impl<'a> Found<'a> {
                 name(first.b.body),
                 match (&kept, clearance > 0.0) {
                     (_, true) if !first.at_start => {
+                        let clearance = exactly(clearance);
                         format!("come as near as a clearance of {clearance}{besides} lets them")
                     }
                     (Some(kept), _) => format!("come within {kept}"),
@@ -226,7 +240,7 @@ impl<'a> Found<'a> {
                 counted(all.len() as u64, "impact"),
                 text::kinds(counts(all)),
                 grouped(n_at_start(all) as u64),
-                hex(all.hash())
+                hex(self.origins.hash_of_impacts(all))
             )?;
         }
         writeln!(to, "{}", output::how(self.stats, &self.times))

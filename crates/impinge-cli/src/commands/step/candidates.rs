@@ -10,6 +10,7 @@ use impinge_io::{Cell, ELEMENTS, KIND};
 
 use crate::asked::Asked;
 use crate::error::Error;
+use crate::origins::Origins;
 use crate::report;
 use crate::rows::Rows;
 use crate::text::{self, counted, hex};
@@ -42,9 +43,9 @@ pub fn write(
     let mut rows = Rows::create(file, columns, None)?;
     let mut written = Written::default();
     let start = Instant::now();
-    let mut each = |run: Candidates| match rows.put(cells(&run)) {
+    let mut each = |run: Candidates| match rows.put(cells(&bodies.origins, &run)) {
         Ok(()) => {
-            written.add(&run);
+            written.add(&bodies.origins, &run);
             ControlFlow::Continue(())
         }
         Err(error) => ControlFlow::Break(error),
@@ -58,10 +59,22 @@ pub fn write(
     Ok(written)
 }
 
-fn cells(run: &Candidates) -> impl Iterator<Item = [Cell<'static>; 5]> + '_ {
-    let of = |kind: PairKind| {
+/// The rows of one kind, with vertices as files number them.
+fn named<'a>(
+    origins: &'a Origins,
+    run: &'a Candidates,
+    kind: PairKind,
+) -> impl Iterator<Item = [u32; 4]> + 'a {
+    run.rows(kind).map(move |row| origins.row(kind, row))
+}
+
+fn cells<'a>(
+    origins: &'a Origins,
+    run: &'a Candidates,
+) -> impl Iterator<Item = [Cell<'static>; 5]> + 'a {
+    let of = move |kind: PairKind| {
         let kind_cell = Cell::Text(kind.name());
-        run.rows(kind).map(move |row| {
+        named(origins, run, kind).map(move |row| {
             let [body_a, a, body_b, b] = row.map(Cell::Number);
             [kind_cell, body_a, a, body_b, b]
         })
@@ -70,11 +83,12 @@ fn cells(run: &Candidates) -> impl Iterator<Item = [Cell<'static>; 5]> + '_ {
 }
 
 impl Written {
-    fn add(&mut self, run: &Candidates) {
+    fn add(&mut self, origins: &Origins, run: &Candidates) {
         for (kind, n) in PairKind::ALL.into_iter().zip(&mut self.counts) {
             *n += run.of(kind).len() as u64;
+            let hash = Candidates::hash_rows(kind, named(origins, run, kind));
+            self.hash = self.hash.wrapping_add(hash);
         }
-        self.hash = self.hash.wrapping_add(run.hash());
         self.n_runs += 1;
         self.stats = run.stats().clone();
     }

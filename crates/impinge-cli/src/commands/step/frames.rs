@@ -7,6 +7,7 @@ use impinge::{BodyId, Detector, Positions, Query, Scene};
 
 use crate::detection::{Times, hit, set_positions};
 use crate::error::Error;
+use crate::origins::Origins;
 use crate::output::out;
 use crate::report;
 use crate::rows::{self, Rows};
@@ -79,7 +80,7 @@ pub trait Frames {
 /// Steps from each frame of a range to the next, the body `moving` in motion and all others at
 /// rest.
 pub fn steps_of_sequence(
-    (detector, scene, moving): (&mut Detector, &mut Scene, BodyId),
+    (detector, scene, moving, origins): (&mut Detector, &mut Scene, BodyId, &Origins),
     step: &Query,
     frames: &mut impl Frames,
     range: Range<usize>,
@@ -114,7 +115,7 @@ pub fn steps_of_sequence(
         }
         let frame_ix = end_ix - 1;
         let impacts = detector.impacts(scene, step)?;
-        let found = Found::all(&impacts, Times::default());
+        let found = Found::all(origins, &impacts, Times::default());
         steps.n += 1;
         steps.n_free += u64::from(found.is_free());
         let intersects = impacts.start_intersects() == Some(true);
@@ -123,7 +124,7 @@ pub fn steps_of_sequence(
         if let Some(rows) = &mut shown.rows {
             let frame = rows::frame(frame_ix);
             rows.put(impacts.iter().map(|found| {
-                let [kind, body_a, a, body_b, b, toi] = rows::impact(found);
+                let [kind, body_a, a, body_b, b, toi] = rows::impact(origins, found);
                 [frame, kind, body_a, a, body_b, b, toi]
             }))?;
         }
@@ -137,7 +138,7 @@ pub fn steps_of_sequence(
             let first = impacts.earliest();
             writeln!(
                 out(),
-                "{:>13} {:>11} {:>23} {:>11.3}  {:016x}",
+                "{:>13} {:>11} {:>23} {:>11.3}  {}",
                 format!("{frame_ix} to {}", frame_ix + 1),
                 grouped(impacts.len() as u64),
                 match first {
@@ -146,7 +147,7 @@ pub fn steps_of_sequence(
                     Some(first) => format!("{:?}", first.toi),
                 },
                 impacts.stats().total_ms,
-                impacts.hash()
+                found.hash().unwrap_or_default()
             )?;
         }
         out().flush()?;

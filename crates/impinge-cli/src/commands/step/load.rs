@@ -1,6 +1,7 @@
 //! Reads the bodies of a step: one file for the start of each body and one for its end.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use impinge::{BodyId, CancelToken, Positions, Scene};
 use impinge_io::{Elements, Format, Mesh, ReadOptions, Weld, printable, read_with_summary};
@@ -8,16 +9,9 @@ use impinge_io::{Elements, Format, Mesh, ReadOptions, Weld, printable, read_with
 use crate::args::StepArgs;
 use crate::detection::set_positions;
 use crate::error::Error;
-use crate::load::{Vertices, tell, tell_coincident, to_elements, to_positions};
+use crate::load::{STDIN, Vertices, tell, tell_coincident, to_elements, to_positions};
+use crate::origins::{Origin, Origins};
 use crate::watch::go_on;
-
-/// A body as its files have it, before vertices are welded.
-#[derive(Debug)]
-pub struct Given {
-    pub elements: Elements,
-    /// The vertex of the scene for each vertex of the files; `None` if they are the same.
-    pub map: Option<Vec<u32>>,
-}
 
 /// A scene whose bodies have end positions, and the files of the bodies.
 #[derive(Debug, Default)]
@@ -26,10 +20,11 @@ pub struct Moving {
     pub ids: Vec<BodyId>,
     /// The files of each body's start and end.
     pub names: Vec<[String; 2]>,
-    /// The bodies before welding, if they are to be written.
-    pub given: Vec<Given>,
+    /// The elements before welding, if bodies are to be written.
+    pub given: Vec<Elements>,
     /// Vertices that share their position with another one at both ends.
     pub vertices: Vec<Vertices>,
+    pub origins: Origins,
 }
 
 impl Moving {
@@ -43,9 +38,10 @@ impl Moving {
             } => {
                 let mut named = self.ids.iter().zip(&self.names);
                 let name = named.find(|(id, _)| **id == body);
+                let number = body.index() as u32;
                 Error::Seam {
                     name: name.map_or_else(|| body.to_string(), |(_, [start, _])| start.clone()),
-                    vertices,
+                    vertices: vertices.map(|vertex| self.origins.vertex(number, vertex)),
                     n_coincident,
                 }
             }
@@ -92,17 +88,18 @@ impl Moving {
     }
 
     fn add(&mut self, start: &Path, end: &Path, args: &StepArgs) -> Result<(), Error> {
+        if [start, end].contains(&Path::new(STDIN)) {
+            let text = "`step` reads files: none can come from standard input";
+            return Err(Error::Usage(text.to_owned()));
+        }
         let names = [start, end].map(|path| path.display().to_string());
         let (mut at_start, summary) = read_with_summary(start, &ReadOptions::as_they_are())?;
         let (mut at_end, _) = read_with_summary(end, &ReadOptions::as_they_are())?;
         same_elements(&names, &at_start, &at_end)?;
         if !args.reached().1.is_empty() {
-            let elements = at_start.elements.clone();
-            self.given.push(Given {
-                elements,
-                map: None,
-            });
+            self.given.push(at_start.elements.clone());
         }
+        let mut origin = Origin::default();
         let mut vertices = Vertices::default();
         // Triangles of an STL file share nothing except positions.
         let welds = args.weld
@@ -114,14 +111,12 @@ impl Moving {
             if welds {
                 weld.apply(&mut at_start);
                 weld.apply(&mut at_end);
-                if let Some(given) = self.given.last_mut() {
-                    given.map = (weld.n_welded() > 0).then(|| weld.map().to_vec());
-                }
                 vertices = Vertices {
                     welds,
                     n_welded: weld.n_welded(),
                     n_coincident: Some(0),
                 };
+                origin = Origin::new(None, Some(&Arc::new(weld)));
             } else {
                 vertices.n_coincident = Some(weld.n_welded());
             }
@@ -150,6 +145,7 @@ impl Moving {
         self.ids.push(id);
         self.names.push(names);
         self.vertices.push(vertices);
+        self.origins.push(origin);
         Ok(())
     }
 }

@@ -4,9 +4,10 @@ use impinge::{BodyId, Positions};
 use impinge_io::{ColoredMesh, Elements, write_obj, write_ply};
 
 use crate::error::Error;
+use crate::origins::Origin;
 use crate::values::ReachedFile;
 
-use super::load::{Given, Moving};
+use super::load::Moving;
 
 /// Fails unless there is a file per body, of a format that holds it.
 pub fn check((option, files): (&str, &[ReachedFile]), bodies: &Moving) -> Result<(), Error> {
@@ -18,8 +19,8 @@ pub fn check((option, files): (&str, &[ReachedFile]), bodies: &Moving) -> Result
         );
         return Err(Error::Usage(text));
     }
-    let misfits = |(file, given): &(&ReachedFile, &Given)| {
-        file.is_obj && matches!(given.elements, Elements::Tetrahedra(_))
+    let misfits = |(file, given): &(&ReachedFile, &Elements)| {
+        file.is_obj && matches!(given, Elements::Tetrahedra(_))
     };
     match files.iter().zip(&bodies.given).find(misfits) {
         None => Ok(()),
@@ -43,8 +44,9 @@ pub fn write<'a>(
             Some(positions) => positions,
             None => bodies.scene.body(id)?.positions(),
         };
-        let positions = as_given(positions, given.map.as_deref());
-        match &given.elements {
+        let map = bodies.origins.of(ix).and_then(Origin::map);
+        let positions = as_given(positions, map);
+        match given {
             Elements::Triangles(faces) if file.is_obj => write_obj(&file.path, &positions, faces)?,
             elements => {
                 let mesh = ColoredMesh {

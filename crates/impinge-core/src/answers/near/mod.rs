@@ -76,6 +76,18 @@ impl NearPair {
         row(self.a, self.b)
     }
 
+    /// Its word in [`NearPairs::hash`], if it had this row.
+    #[doc(hidden)]
+    pub fn hash_as(&self, row: [u32; 4]) -> u64 {
+        let [a, b] = self.features.map(|feature| match feature {
+            Feature::Vertex(ix) => u64::from(ix),
+            Feature::Edge(ix) => 8 + u64::from(ix),
+            Feature::Face => 16,
+        });
+        let word = self.kind as u64 | a << 8 | b << 16 | u64::from(self.is_parallel) << 24;
+        mix(hash_row(row) ^ mix(word))
+    }
+
     /// What makes it the same pair in another answer, in the order of answers.
     fn key(self) -> (PairKind, Element, Element) {
         (self.kind, self.a, self.b)
@@ -358,15 +370,7 @@ impl<'a> NearIter<'a> {
 
     /// [`NearPairs::hash`] of the pairs that are left.
     pub fn hash(self) -> u64 {
-        self.fold(0, |sum, pair| {
-            let [a, b] = pair.features.map(|feature| match feature {
-                Feature::Vertex(ix) => u64::from(ix),
-                Feature::Edge(ix) => 8 + u64::from(ix),
-                Feature::Face => 16,
-            });
-            let word = pair.kind as u64 | a << 8 | b << 16 | u64::from(pair.is_parallel) << 24;
-            sum.wrapping_add(mix(hash_row(pair.row()) ^ mix(word)))
-        })
+        self.fold(0, |sum, pair| sum.wrapping_add(pair.hash_as(pair.row())))
     }
 }
 
