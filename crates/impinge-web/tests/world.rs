@@ -380,13 +380,32 @@ fn what_is_left_out_is_what_the_library_leaves_out() -> Result<(), Error> {
     assert_eq!(n as usize, all);
     assert_eq!(near(&mut asker, &world, &[3, 5, 0])?, 0);
     let refused = near(&mut asker, &World::new(), &[3, 5, 0]).expect_err("another scene");
-    assert!(refused.to_string().starts_with("exclude: pairs at rest"));
+    assert!(refused.to_string().starts_with("exclude: pairs given"));
     assert_eq!(world.keep_at_rest(6, 1.0)?, n);
-    world.forget_at_rest(5);
-    world.forget_at_rest(5);
+    world.forget_pairs(5);
+    world.forget_pairs(5);
     let refused = near(&mut asker, &world, &[3, 5, 0]).expect_err("forgotten");
     assert!(refused.to_string().contains("disposed of"), "{refused}");
     assert_eq!(near(&mut asker, &world, &[3, 6, 0])?, 0);
+    // Listed pairs of vertices: all of the lower triangle with all of the upper one.
+    world.keep_vertex_pairs(
+        7,
+        [below, above],
+        &[0, 3, 6, 9],
+        &[0, 1, 2, 2, 1, 0, 0, 2, 1],
+    )?;
+    assert_eq!(near(&mut asker, &world, &[3, 7, 0])?, 0);
+    world.keep_vertex_pairs(8, [below, above], &[0, 1, 1, 1], &[0])?;
+    let some = near(&mut asker, &world, &[3, 8, 0])?;
+    assert!(0 < some && some < all);
+    world.keep_vertex_pairs(9, [below, above], &[0, 1, 1], &[0])?;
+    let refused = near(&mut asker, &world, &[3, 9, 0]).expect_err("one offset is missing");
+    assert!(refused.to_string().contains("3 offsets"), "{refused}");
+    assert!(
+        world
+            .keep_vertex_pairs(9, [below, 77], &[0, 1, 1, 1], &[0])
+            .is_err()
+    );
     world.set_pinned(below, &[1, 1, 1])?;
     assert_eq!(near(&mut asker, &world, &[])?, all);
     world.set_pinned(above, &[1, 1, 1])?;
