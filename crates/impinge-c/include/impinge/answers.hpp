@@ -25,7 +25,10 @@ template <class Handle, class Row, auto count_of, auto data_of, auto column_of, 
 public:
   using value_type = Row;
   answer() = default;
-  explicit answer(Handle *handle) : handle_(handle) {}
+  explicit answer(Handle *handle) : handle_(handle, detail::deleter<destroy>()) {}
+  // What it has is not copied by accident.
+  answer(answer &&) noexcept = default;
+  answer &operator=(answer &&) noexcept = default;
   std::size_t size() const noexcept { return count_of(raw()); }
   bool empty() const noexcept { return size() == 0; }
   const Row *data() const & noexcept { return data_of(raw()); }
@@ -43,6 +46,8 @@ public:
   impinge_stats stats() const & { return detail::stats_of(of_stats, raw()); }
   Handle *raw() noexcept { return handle_.get(); }
   const Handle *raw() const noexcept { return handle_.get(); }
+  /// Keeps what the answer has, whatever becomes of it.
+  std::shared_ptr<const Handle> shared() const noexcept { return handle_; }
   // A temporary ends before its views are read.
   void data() const && = delete;
   void begin() const && = delete;
@@ -60,7 +65,7 @@ protected:
   }
 
 private:
-  detail::handle<Handle, destroy> handle_;
+  std::shared_ptr<Handle> handle_;
 };
 
 namespace detail {

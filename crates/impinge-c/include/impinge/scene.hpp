@@ -2,6 +2,10 @@
 #ifndef IMPINGE_SCENE_HPP
 #define IMPINGE_SCENE_HPP
 
+#if (defined(_MSVC_LANG) && _MSVC_LANG < 201703L) || (!defined(_MSVC_LANG) && __cplusplus < 201703L)
+#error "impinge.hpp needs C++17: -std=c++17, or CXX_STANDARD 17 in CMake"
+#endif
+
 #include <impinge.h>
 
 #include <array>
@@ -310,7 +314,8 @@ enum class hits_of_ray : std::uint32_t { first = IMPINGE_HITS_FIRST, any = IMPIN
 /// How candidates are found.
 enum class method : std::uint32_t { automatic = IMPINGE_METHOD_AUTO, clusters = IMPINGE_METHOD_CLUSTERS, cells = IMPINGE_METHOD_CELLS, naive = IMPINGE_METHOD_NAIVE };
 
-/// Which pairs, and how: one query for all questions. `impinge_query` in impinge.h describes each option.
+/// Which pairs, and how: one query for all questions. `impinge_query` in impinge.h describes each option. Setters return the query that they
+/// change, so keep one by value: in `const auto &of = query::all().distances()` it ends with the line.
 class query {
 public:
   /// Everything: pairs of different bodies and self-collision.
@@ -349,13 +354,13 @@ public:
     exclusions_.back().vertices = detail::rows_of(vertices, 1);
     return *this;
   }
-  /// Leaves out the pairs of an answer of `detector::near`, such as those that are near at rest. It must live as long as the query is asked,
-  /// so a temporary answer is refused.
+  /// Leaves out the pairs of an answer of `detector::near`, such as those that are near at rest. The query keeps them, whatever becomes of the
+  /// answer.
   template <class Near> query &exclude(const Near &rest_pairs) {
+    kept_.push_back(rest_pairs.shared());
     rest_pairs_.push_back(rest_pairs.raw());
     return *this;
   }
-  template <class Near> query &exclude(const Near &&) = delete;
   /// Bodies that do not move, of `detector::safe_distances`.
   query &fixed(std::vector<body> bodies) {
     fixed_ = std::move(bodies);
@@ -433,6 +438,8 @@ private:
   std::vector<impinge_exclusion> exclusions_;
   std::vector<body> fixed_;
   std::vector<const impinge_near *> rest_pairs_;
+  /// Owners of these.
+  std::vector<std::shared_ptr<const impinge_near>> kept_;
 };
 
 /// Bodies: topology once, positions every frame. Elements and positions are anything that `as_array` reads: vectors of numbers or of
