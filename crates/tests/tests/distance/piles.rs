@@ -121,7 +121,7 @@ fn a_high_pile_is_stopped_at_once() {
                 .add_triangles(&[[0, 1, 2]], &there(height))
                 .expect("good");
             scene
-                .set_end_positions(body, there(height - SINK))
+                .set_end_positions(body, &there(height - SINK))
                 .expect("good");
             (body, there(height - SINK))
         };
