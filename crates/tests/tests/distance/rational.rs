@@ -257,17 +257,15 @@ fn slanted(seed: u64) -> (Scene, Vec<BodyId>) {
         }))
     };
     let faces = [[0, 1, 2], [2, 1, 3], [4, 5, 6], [7, 5, 6]];
-    let mut bodies = Vec::new();
-    bodies.push(scene.add_triangles(&faces, &points(8, 3)).expect("good"));
-    // All of it in one plane.
-    bodies.push(scene.add_triangles(&faces, &points(8, 1)).expect("good"));
-    bodies.push(
-        scene
-            .add_edges(&[[0, 1], [1, 2]], &points(3, 2))
-            .expect("good"),
-    );
-    bodies.push(scene.add_points(&points(3, 2)).expect("good"));
-    (scene, bodies)
+    let bodies = [
+        scene.add_triangles(&faces, &points(8, 3)),
+        // All of it in one plane.
+        scene.add_triangles(&faces, &points(8, 1)),
+        scene.add_edges(&[[0, 1], [1, 2]], &points(3, 2)),
+        scene.add_points(&points(3, 2)),
+    ];
+    let bodies = bodies.into_iter().collect::<Result<_, _>>();
+    (scene, bodies.expect("good"))
 }
 
 #[test]

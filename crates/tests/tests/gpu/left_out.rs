@@ -186,10 +186,6 @@ fn damaged_filters_are_noticed() {
     for (line, wrong) in [
         // Pinned vertices.
         (
-            "mark(corner.z) & mark(corner.w) & PINNED",
-            "mark(corner.z) & PINNED",
-        ),
-        (
             "(are_pinned(a) && are_pinned(b))",
             "(are_pinned(a) || are_pinned(b))",
         ),
