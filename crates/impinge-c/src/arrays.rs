@@ -66,15 +66,27 @@ impl<T: Copy, const N: usize> Strided<T, N> {
                 array.data
             )));
         }
+        // So the classes of C++ pass on rows of another length.
+        if let [1, columns @ ..=-1] = strides
+            && size > 1
+        {
+            let columns = columns.unsigned_abs();
+            let turned = match array.rows == N && columns != N {
+                true => ", one row per position or element: transpose the matrix",
+                false => "",
+            };
+            return Err(Failure::invalid(format!(
+                "{what}: rows of {columns} numbers given, {N} needed{turned}"
+            )));
+        }
         for (name, stride, n) in [
             ("row_stride", strides[0], array.rows),
             ("column_stride", strides[1], N),
         ] {
             if stride == 1 && size > 1 {
-                // So the classes of C++ pass on a matrix or a list that does not fit.
+                // And a list of numbers that does not end with a row.
                 return Err(Failure::invalid(format!(
-                    "{what}: rows are not of {N} numbers each: one row per position or element, so transpose a matrix with one per \
-                     column ({name} is 1: strides are in bytes)"
+                    "{what}: rows are not of {N} numbers each ({name} is 1: strides are in bytes)"
                 )));
             }
             if stride % size != 0 {

@@ -72,7 +72,7 @@ int main(void) {
   REFUSED(impinge_scene_set_positions(scene, 0, bad), "strides are in bytes");
   REFUSED(impinge_scene_set_positions(scene, 0, bad), "no multiple of the");
   bad.row_stride = 1;
-  REFUSED(impinge_scene_set_positions(scene, 0, bad), "rows are not of 3 numbers each: one row per position");
+  REFUSED(impinge_scene_set_positions(scene, 0, bad), "rows are not of 3 numbers each (row_stride is 1: strides are in bytes)");
   bad.row_stride = 24;
   bad.column_stride = 0;
   REFUSED(impinge_scene_set_positions(scene, 0, bad), "column_stride is 0");

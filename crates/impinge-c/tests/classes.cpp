@@ -148,7 +148,7 @@ void steps() {
   CHECK(nearest && nearest->distance >= 1e-3 && nearest->distance < 1.01e-3);
   throws(IMPINGE_ERROR_INVALID, "no body 9", [&] { scene.set_positions(9, numbers(balls[0])); });
   throws(IMPINGE_ERROR_INVALID, "row_stride", [&] { scene.set_positions(a, std::vector<double>(3 * VERTICES + 1)); });
-  throws(IMPINGE_ERROR_INVALID, "row_stride", [&] { scene.set_positions(a, std::vector<std::array<float, 4>>(VERTICES)); });
+  throws(IMPINGE_ERROR_INVALID, "rows of 4 numbers given, 3 needed", [&] { scene.set_positions(a, std::vector<std::array<float, 4>>(VERTICES)); });
   // Less than one row is not no row.
   const char *no_row = "rows are not of 3 numbers each";
   const std::vector<double> two{0.1, 0.1};

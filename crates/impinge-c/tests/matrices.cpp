@@ -65,7 +65,13 @@ int main() {
     CHECK(!"it has thrown");
   } catch (const impinge::error &error) {
     CHECK(error.status() == IMPINGE_ERROR_INVALID);
-    CHECK(std::strstr(error.what(), "rows are not of 3 numbers each") != nullptr);
+    CHECK(std::strstr(error.what(), "rows of 7 numbers given, 3 needed") != nullptr);
+  }
+  try {
+    scene.set_positions(body, columns.transpose().eval());
+    CHECK(!"it has thrown");
+  } catch (const impinge::error &error) {
+    CHECK(std::strstr(error.what(), "needed, one row per position or element: transpose the matrix") != nullptr);
   }
   // Flags are one column, also of bytes, which any stride fits.
   using bytes = Eigen::Matrix<std::uint8_t, Eigen::Dynamic, Eigen::Dynamic>;

@@ -19,11 +19,11 @@ struct as_array<T, std::enable_if_t<std::is_base_of_v<Eigen::MatrixBase<T>, T> |
     const auto size = static_cast<std::ptrdiff_t>(sizeof(number));
     const auto n = static_cast<std::size_t>(matrix.rows());
     // An empty matrix, such as one without edges, may have any number of columns. Rows of another length are refused: strides of 1 byte
-    // fit no number.
+    // fit no number, and the other one says how long they are.
     const bool fits = n == 0 || static_cast<std::size_t>(matrix.cols()) == columns;
     // Bytes it fits: these pass for larger numbers then.
     const auto type = fits || size > 1 ? detail::type_of<number>() : static_cast<std::uint32_t>(IMPINGE_U32);
-    return {matrix.data(), n, fits ? matrix.rowStride() * size : 1, fits ? matrix.colStride() * size : 1, type};
+    return {matrix.data(), n, fits ? matrix.rowStride() * size : 1, fits ? matrix.colStride() * size : -static_cast<std::ptrdiff_t>(matrix.cols()), type};
   }
 };
 

@@ -253,7 +253,9 @@ template <class Row> array packed_rows(const void *data, std::size_t size, std::
   const bool fits = n > 0 ? n == columns : size % columns == 0;
   // Rows of another length make an array that the library refuses, so a row that has only begun counts: no rows at all are accepted.
   const std::ptrdiff_t stride = fits ? 0 : 1;
-  return {data, n > 0 ? size : size / columns + (fits ? 0 : 1), stride, stride, type_of<number>()};
+  // Of rows, the other stride says how long they are.
+  const std::ptrdiff_t length = fits || n == 0 ? stride : -static_cast<std::ptrdiff_t>(n);
+  return {data, n > 0 ? size : size / columns + (fits ? 0 : 1), stride, length, type_of<number>()};
 }
 } // namespace detail
 
