@@ -1285,7 +1285,7 @@ class Truncation(_Motion):
     @property
     def pairs(self) -> Candidates:
         """Candidates : the pairs that stopped vertices, those that touch at the start included. Sorted anew each time, so that it costs
-        nothing where nobody asks.
+        no time where nobody asks.
         """
         return Candidates(self._inner.pairs())
 

@@ -165,6 +165,23 @@ def test_lists_are_read_into_the_memory_of_those_before(scene, detector):
         detector.neighbours(scene, 0.2, out=expected.vf)
 
 
+def test_positions_that_are_not_copied_are_checked_when_they_are_read():
+    scene = impinge.Scene()
+    n = 40_000
+    strip = np.stack([np.arange(n), np.arange(n) % 2, np.zeros(n)], 1).astype(np.float32)
+    a, b = (scene.add(strip, np.stack([np.arange(n - 2) + k for k in range(3)], 1)) for _ in range(2))
+    bad = strip.copy()
+    bad[17, 1] = np.nan
+    bad.flags.writeable = False
+    scene.set_positions(b, bad, copy=False)
+    detector = impinge.Detector("cpu")
+    for ask in (lambda: detector.detect(scene), lambda: scene._convex_overlap(a, b), lambda: detector.near(scene, 0.1)):
+        with pytest.raises(ValueError, match="vertex 17"):
+            ask()
+    with pytest.raises(ValueError, match="vertex 17"):
+        scene.set_positions(a, bad)
+
+
 def test_lists_are_read_into_arrays_of_the_caller(scene, detector):
     lists = detector.neighbours(scene, 0.3)
     csr = lists.vf

@@ -17,7 +17,8 @@ pub struct Place {
     /// The problem.
     pub problem: Problem,
     /// The vertex of several fans, numbered as in the mesh before welding, of welded ones the
-    /// first; then the elements are those around it.
+    /// first, so no index into the mesh that was [checked](crate::Checked::mesh); then the elements
+    /// are those around it.
     pub vertex: Option<u32>,
     /// The middle of the element that is nearest to the middle of the place, or the vertex;
     /// rounded.

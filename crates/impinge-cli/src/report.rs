@@ -473,7 +473,7 @@ pub struct Safe {
     #[cfg_attr(test, schemars(range(min = 0)))]
     pub most: f64,
     pub asked: Asked,
-    /// How many vertices the files have of bodies that are not fixed
+    /// How many vertices bodies that are not fixed have, as their files number them
     pub vertices: usize,
     /// How many of them may move by less than `most`
     pub bounded: usize,

@@ -124,9 +124,13 @@ impl Parts {
             of_parts[place].1.extend_from_slice(&faces[first..end]);
         }
         if let [(part, _)] = of_parts[..] {
-            let given = self.names.get(part).filter(|(_, is_given, _)| *is_given);
-            let name = given.map(|(name, ..)| name.clone());
-            return vec![NamedMesh::whole(name, mesh)];
+            let named = self.names.get(part);
+            // Vertices of parts without triangles may come before its own.
+            if named.is_none_or(|(.., base)| *base == 0) {
+                let given = named.filter(|(_, is_given, _)| *is_given);
+                let name = given.map(|(name, ..)| name.clone());
+                return vec![NamedMesh::whole(name, mesh)];
+            }
         }
         let mut names = Names::default();
         let mut numbers = vec![0; mesh.positions.len()];

@@ -547,6 +547,10 @@ impl Scene {
         a: &Bound<'_, PyAny>,
         b: &Bound<'_, PyAny>,
     ) -> PyResult<Option<Overlap>> {
+        for (body, name) in [(a, "a"), (b, "b")] {
+            let checked = self.inner.check_positions(self.id(body, name)?);
+            checked.map_err(raise)?;
+        }
         let bodies = [self.body(a)?, self.body(b)?];
         Ok(py.detach(|| {
             let [a, b] = bodies.map(|body| -> Vec<[f64; 3]> {

@@ -55,7 +55,7 @@ Columns of numbers alone are a plain array in .npy files, others a structured on
 `probe`: point, element, feature, distance, x, y, z, with --signed then place: inside, on or outside, and the distance is
   negative outside. Distances are rounded down. The nearest point is one column, nearest, in .jsonl and .npy files. With
   --nearest K up to K rows per point, nearest first. --locate adds a last column: tetrahedron, -1 for none.
-`safe`: body, vertex, safe: how far it may move, rounded down; a row per vertex of the file
+`safe`: body, vertex, safe: how far it may move, rounded down; a row per vertex of the file, or of a node's or group's faces
 `cast`: ray, element, feature, t, t_end, b0, b1, b2 (barycentrics in .jsonl and .npy files); with --hits any: ray, hit
 `step`: kind, body_a, element_a, body_b, element_b, toi. Of kind vf, a is the vertex and b the face. Mesh files
   hold faces, so kinds are vf and ee; ev and vv are of bodies of edges or points, which the library and the

@@ -249,10 +249,7 @@ impl<'a> ContactBodies<'a> {
             if !own.is_empty() && body.numbers_stamp(Part::Given) != numbers_stamp {
                 return Err(Error::Remeshed { body: id });
             }
-            if !body.is_checked() {
-                body.positions().check(id)?;
-                body.set_checked();
-            }
+            body.check_once(id)?;
             bodies.resize_with(bodies.len().max(id.index() + 1), || None);
             bodies[id.index()] = Some(Taking {
                 stamp: (id, positions_stamp),

@@ -110,8 +110,14 @@ impl Refit {
             cache.whole = Aabb::EMPTY;
             self.push_needed(workers, ix, plan.parts.len(), cache, needed);
         }
-        if !self.work(isa, job, tuning, caches, scratches) {
-            plan.check(scene, workers)?;
+        match self.work(isa, job, tuning, caches, scratches) {
+            // All vertices of these bodies were read.
+            true => {
+                let read = self.tasks.iter().map(|task| plan.body(scene, task.part));
+                let unknown = read.filter(|body| !body.is_checked());
+                unknown.for_each(|body| body.set_checked());
+            }
+            false => plan.check(scene, workers)?,
         }
         if is_allowed {
             self.tasks.clear();

@@ -54,6 +54,8 @@ impl Detector {
     pub fn advance(&mut self, scene: &Scene, query: &Query) -> Result<Advance, Error> {
         let control = &self.control.clone();
         refuse_cell(query)?;
+        // Also those that the query is not about take their step.
+        scene.check_moving()?;
         let with_close = self.lists_close_pairs();
         let plan = Plan::advance(scene, query, with_close, self.limits_of_steps())?;
         let start = self.verify(scene, query)?;

@@ -95,6 +95,8 @@ impl Detector {
     pub fn truncate(&mut self, scene: &Scene, query: &Query) -> Result<Truncation, Error> {
         refuse_cell(query)?;
         let begun = Instant::now();
+        // Also those that the query is not about take their step.
+        scene.check_moving()?;
         let plan_of = |scene: &Scene, limits| Plan::touching(scene, query, limits);
         let mut plan = plan_of(scene, self.limits_of_steps())?;
         let start = self.verify(scene, query)?.map(|start| start.intersects);
@@ -112,6 +114,7 @@ impl Detector {
         let mut vertices = Vertices::new(scene, &plan)?;
         let mut now = scene.clone();
         let mut stats = Stats::default();
+        let mut most_pairs = 1 << 16;
         loop {
             let moved = Moved {
                 firsts: &vertices.firsts,
@@ -121,14 +124,15 @@ impl Detector {
             self.find_contacts_of((&now, &plan), (!is_first).then_some(moved))?;
             stats.add(&self.stats);
             let stops = Instant::now();
-            let StoppingPairs { touching, meeting } = if truncation.n_rounds == MOST_ROUNDS {
-                StoppingPairs {
-                    meeting: self.part(&mut vertices, scene, (&now, &plan))?,
-                    ..StoppingPairs::default()
-                }
-            } else {
-                self.stop(&vertices, (scene, &plan))?
-            };
+            let mut stopping = StoppingPairs::default();
+            if truncation.n_rounds == MOST_ROUNDS && self.steps.contacts.found().next().is_some() {
+                stopping.meeting = self.part(&vertices, scene, (&now, &plan))?;
+                stats.add(&self.stats);
+            }
+            if stopping.meeting.is_empty() {
+                stopping = self.stop(&vertices, (scene, &plan))?;
+            }
+            let StoppingPairs { touching, meeting } = stopping;
             if is_first {
                 // All that touch at the start are known now.
                 refuse_seams(scene, &plan, touching.iter().copied())?;
@@ -142,6 +146,12 @@ impl Detector {
                 "pairs that stopped vertices",
             )?;
             pairs.extend(touching.into_iter().chain(meeting));
+            if pairs.len() > most_pairs {
+                // Many meet again in later rounds.
+                pairs.sort_unstable_by_key(|&(kind, key)| (kind as usize, key));
+                pairs.dedup();
+                most_pairs = most_pairs.max(2 * pairs.len());
+            }
             let any = vertices.go_back(scene);
             stats.add_ms("stops", stops.elapsed().as_secs_f64() * 1e3);
             if !any {

@@ -93,12 +93,7 @@ impl Plan {
     /// As [`check`](Plan::check), for one part.
     pub fn check_one(&self, scene: &Scene, part: PartIx) -> Result<(), Error> {
         let body = self.body(scene, part);
-        if body.is_checked() {
-            return Ok(());
-        }
-        body.positions().check(self.part(part).id)?;
-        body.set_checked();
-        Ok(())
+        body.check_once(self.part(part).id)
     }
 
     fn push(

@@ -173,10 +173,7 @@ impl OfTwo {
         work: Work<'_>,
     ) -> Result<(), Error> {
         let body = scene.body(id)?;
-        if !body.is_checked() {
-            body.positions().check(id)?;
-            body.set_checked();
-        }
+        body.check_once(id)?;
         let body_part = BodyPart::new(id, body, part);
         let (slot, stats) = (id.index(), &mut self.stats);
         let known = self.trees.remove(&(slot, part));

@@ -343,6 +343,15 @@ impl Body {
         Ok(true)
     }
 
+    /// Refuses positions that nothing has checked yet and that are not finite.
+    pub(crate) fn check_once(&self, body: BodyId) -> Result<(), Error> {
+        if !self.is_checked() {
+            self.positions.check(body)?;
+            self.set_checked();
+        }
+        Ok(())
+    }
+
     /// Sets checked positions at the end of a step.
     pub(super) fn set_end(&mut self, mut end: Positions, is_transformed: bool) {
         self.positions.widen_as(&end);
@@ -372,4 +381,90 @@ impl Body {
 /// Whether all of these vertices of a body are [pinned](Body::pinned).
 pub(crate) fn are_all_pinned(pinned: &[bool], corners: &[u32]) -> bool {
     corners.iter().all(|&corner| pinned[corner as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use crate::{Backend, Detector, Method, Query, Scene, Settings};
+
+    /// A strip of triangles with so many vertices.
+    fn strip(scene: &mut Scene, n: u32) -> (crate::BodyId, Vec<[f32; 3]>) {
+        let faces: Vec<[u32; 3]> = (2..n).map(|ix| [ix - 2, ix - 1, ix]).collect();
+        let points = (0..n)
+            .map(|ix| [ix as f32, (ix % 2) as f32, 0.0])
+            .collect::<Vec<_>>();
+        let body = scene.add_triangles(&faces, &points).expect("good");
+        (body, points)
+    }
+
+    /// What is given without a copy is looked at by the first question alone, whichever it is.
+    #[test]
+    fn questions_remember_that_positions_are_finite() {
+        let mut scene = Scene::new();
+        let (body, points) = strip(&mut scene, 40_000);
+        let (small, few) = strip(&mut scene, 100);
+        let is_checked = |scene: &Scene| scene.body(body).expect("held").is_checked();
+        for method in [Method::Clusters, Method::Cells] {
+            let settings = Settings::from(Backend::Cpu).method(method);
+            for threads in [1, 2] {
+                let mut detector = Detector::new(settings.clone().threads(threads)).expect("good");
+                for question in 0..5 {
+                    let lent = Arc::new(points.clone());
+                    scene
+                        .set_positions(body, Arc::clone(&lent))
+                        .expect("as many");
+                    scene.set_positions(small, few.clone()).expect("good");
+                    assert!(!is_checked(&scene) && scene.body(small).expect("held").is_checked());
+                    let copy = scene.clone();
+                    let query = Query::all();
+                    match question {
+                        0 => drop(detector.detect(&scene, &query).expect("good")),
+                        1 => drop(detector.near(&scene, 0.1, &query).expect("good")),
+                        2 => drop(detector.distance(&scene, body, small).expect("good")),
+                        3 => {
+                            scene
+                                .set_end_positions(body, Arc::clone(&lent))
+                                .expect("good");
+                            drop(
+                                detector
+                                    .truncate(&scene, &Query::between(small, body))
+                                    .expect("good"),
+                            );
+                        }
+                        _ => drop(
+                            detector
+                                .closest(&scene, &[[0.0; 3]], 1.0, &query)
+                                .expect("good"),
+                        ),
+                    }
+                    assert!(is_checked(&scene), "{method:?} {threads} {question}");
+                    assert!(!is_checked(&copy));
+                }
+            }
+        }
+    }
+
+    /// Bodies that a step is not asked about take it, too.
+    #[test]
+    fn steps_refuse_what_moves_though_nobody_asks_about_it() {
+        let mut scene = Scene::new();
+        let (body, mut points) = strip(&mut scene, 40_000);
+        let (a, _) = strip(&mut scene, 10);
+        let (b, _) = strip(&mut scene, 10);
+        points[7][1] = f32::NAN;
+        scene.set_positions(body, points.clone()).expect("as many");
+        points[7][1] = 0.0;
+        scene.set_end_positions(body, points).expect("good");
+        let mut detector = Detector::new(Backend::Cpu).expect("good");
+        let query = Query::between(a, b);
+        for error in [
+            detector.advance(&scene, &query).map(drop),
+            detector.truncate(&scene, &query).map(drop),
+        ] {
+            let error = error.expect_err("it has no way").to_string();
+            assert!(error.contains("vertex 7"), "{error}");
+        }
+    }
 }

@@ -86,6 +86,24 @@ impl Scene {
         Ok(())
     }
 
+    /// Refuses positions of a body that were written in place, or taken over, and are not finite, as
+    /// questions about it do.
+    ///
+    /// # Errors
+    /// The id names no body; positions that are refused.
+    #[doc(hidden)]
+    pub fn check_positions(&self, body: BodyId) -> Result<(), Error> {
+        self.body(body)?.check_once(body)
+    }
+
+    /// The same of all bodies that move, whether they are asked about or not.
+    pub(crate) fn check_moving(&self) -> Result<(), Error> {
+        let mut moving = self
+            .bodies()
+            .filter(|(_, body)| body.end_positions().is_some());
+        moving.try_for_each(|(id, body)| body.check_once(id))
+    }
+
     /// Clears a body's end positions: it stands still.
     ///
     /// # Errors
@@ -140,9 +158,7 @@ impl Scene {
     pub fn set_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
         let matrix = Affine::new(matrix)?;
         let target = self.moved_body(body)?;
-        if !target.is_checked() {
-            target.positions.check(body)?;
-        }
+        target.check_once(body)?;
         matrix.check(body, target.rest_positions())?;
         let rest = match target.motion.take() {
             Some(motion) => motion.rest,
@@ -209,9 +225,7 @@ impl Scene {
     pub fn set_end_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
         let matrix = Affine::new(matrix)?;
         let target = self.moved_body(body)?;
-        if !target.is_checked() {
-            target.positions.check(body)?;
-        }
+        target.check_once(body)?;
         matrix.check(body, target.rest_positions())?;
         let mut end = target.end.take().unwrap_or_else(|| f32::store(&[]));
         matrix.write(target.rest_positions(), &mut end);

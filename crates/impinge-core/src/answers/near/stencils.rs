@@ -107,10 +107,7 @@ impl NearIter<'_> {
             check_rest(scene, rest)?;
         }
         for (id, body) in scene.bodies() {
-            if !body.is_checked() {
-                body.positions().check(id)?;
-                body.set_checked();
-            }
+            body.check_once(id)?;
         }
         let (n, threads) = (self.len(), self.threads());
         let rows = sink::with_capacity(n, WHAT)?;

@@ -11,14 +11,13 @@
 //! later. They stop more than they must, as where a sheet flies within its own plane. So only groups
 //! in which a pair still meets get them; all other vertices are not taken back.
 //!
-//! Cost: a search for overlapping boxes. Memory: a run of pairs, a number per vertex.
+//! Cost: two searches for overlapping boxes, one for the groups and one for those that meet. Memory:
+//! a run of pairs, a number per vertex, and the pairs that stop vertices.
 //!
 //! Source: "Divide and Truncate" has planes for all pairs, in its only round.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
-
-use super::{Detector, Pair, TASK, Vertices, WHOLE, located};
+use super::{Detector, Pair, PairPoints, TASK, Vertices, located};
+use crate::answers::candidates::Candidates;
 use crate::plan::{Plan, TestId};
 use crate::query::step::Start;
 use crate::scene::Scene;
@@ -26,8 +25,10 @@ use crate::scene::error::Error;
 use crate::search::found::PairList;
 use crate::search::narrow::exact_kind;
 use crate::search::sink::{filled, grow, reserve};
+use crate::search::work::Work;
 use impinge_exact::are_within;
 use impinge_exact::internal::shares_at_rest;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 impl Detector {
     /// Stops the vertices of all groups in which a pair touches, so that none does any more.
@@ -37,7 +38,7 @@ impl Detector {
     /// Cancellation; no memory.
     pub(super) fn part(
         &mut self,
-        vertices: &mut Vertices,
+        vertices: &Vertices,
         scene: &Scene,
         (now, plan): (&Scene, &Plan),
     ) -> Result<PairList, Error> {
@@ -46,69 +47,90 @@ impl Detector {
         let mut rounded = plan.clone();
         rounded.round(now);
         let plan = &rounded;
-        let held: &Vertices = vertices;
-        let mut stopped = PairList::new();
         self.each_overlap((now, plan), |run, work| {
-            let all = Mutex::new(&mut stopped);
-            for (kind, keys) in run.keys() {
-                let Some(pair) = exact_kind(TestId::Elements(kind)) else {
-                    continue;
-                };
-                let mut tasks: Vec<&[u64]> = keys.chunks(work.workers.task(TASK)).collect();
-                work.each(&mut tasks, |_, keys| {
-                    let parts = |key: &u64| held.part((pair, *key), (now, plan), &groups);
-                    let own = Vec::from_iter(keys.iter().copied().filter(parts));
-                    let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
-                    grow(&mut all, own.len(), WHAT)?;
-                    all.extend(own.into_iter().map(|key| (kind, key)));
-                    Ok(())
-                })?;
-            }
+            those_of(&run, work, |pair| {
+                if let Some((points, _)) = vertices.at_rest(pair, (now, plan)) {
+                    let mut moving = points.moving().map(|ix| points.own[ix]);
+                    let first = moving.next();
+                    moving.for_each(|vertex| groups.join(first.unwrap_or(vertex), vertex));
+                }
+                false
+            })?;
             Ok(())
         })?;
-        let mut meet = filled(false, held.all.len(), "vertices")?;
-        let mover = |(kind, key)| {
-            let pair = exact_kind(TestId::Elements(kind))?;
-            let points = held.points(&located(plan, pair, key), (now, plan));
-            points.moving().next().map(|ix| groups.of(points.own[ix]))
-        };
+        let mut meet = filled(false, vertices.all.len(), "vertices")?;
         for (kind, found) in self.steps.contacts.found() {
-            if let Some(group) = mover((kind, found.key)) {
-                meet[group] = true;
+            let Some(pair) = exact_kind(TestId::Elements(kind)) else {
+                continue;
+            };
+            let points = vertices.points(&located(plan, pair, found.key), (now, plan));
+            if let Some(ix) = points.moving().next() {
+                meet[groups.of(points.own[ix])] = true;
             }
         }
-        stopped.retain(|&pair| mover(pair).is_some_and(|group| meet[group]));
-        for (vertex, most) in vertices.most.iter_mut().enumerate() {
-            if !meet[groups.of(vertex)] {
-                *most.get_mut() = WHOLE;
-            }
-        }
+        let mut stopped = PairList::new();
+        self.each_overlap((now, plan), |run, work| {
+            let own = those_of(&run, work, |pair| {
+                let Some((points, shares)) = vertices.at_rest(pair, (now, plan)) else {
+                    return false;
+                };
+                let mut moving = points.moving().map(|ix| points.own[ix]);
+                let meets = moving.next().is_some_and(|vertex| meet[groups.of(vertex)]);
+                meets && vertices.stop_by(&points, &shares)
+            })?;
+            grow(&mut stopped, own.len(), WHAT)?;
+            stopped.extend(own);
+            Ok(())
+        })?;
         Ok(stopped)
     }
 }
 
+/// The pairs of a run of which something holds.
+fn those_of(
+    run: &Candidates,
+    work: Work<'_>,
+    holds: impl Fn(Pair) -> bool + Sync,
+) -> Result<PairList, Error> {
+    let mut all = PairList::new();
+    for (kind, keys) in run.keys() {
+        let Some(pair) = exact_kind(TestId::Elements(kind)) else {
+            continue;
+        };
+        let chunks = keys.chunks(work.workers.task(TASK));
+        let mut tasks: Vec<_> = chunks.map(|keys| (keys, Vec::new())).collect();
+        work.each(&mut tasks, |_, (keys, own)| {
+            own.extend(keys.iter().copied().filter(|&key| holds((pair, key))));
+            Ok(())
+        })?;
+        let found = tasks.into_iter().flat_map(|(_, own)| own);
+        all.extend(found.map(|key| (kind, key)));
+    }
+    Ok(all)
+}
+
 impl Vertices {
-    /// Parts a pair whose boxes overlap by planes that rest. Returns whether this stops a vertex.
-    fn part(&self, (pair, key): Pair, (now, plan): (&Scene, &Plan), groups: &Groups) -> bool {
+    /// The points of a pair whose boxes overlap, and the shares of their ways before planes that
+    /// rest. `None` if nothing of it moves, or it does not count.
+    fn at_rest(
+        &self,
+        (pair, key): Pair,
+        (now, plan): (&Scene, &Plan),
+    ) -> Option<(PairPoints, [f64; 4])> {
         let located = located(plan, pair, key);
         let points = self.points(&located, (now, plan));
-        let mut moving = points.moving().map(|ix| points.own[ix]);
-        let Some(first) = moving.next() else {
-            return false;
-        };
-        if !plan.counts(now, key) {
-            return false;
+        if points.moving().next().is_none() || !plan.counts(now, key) {
+            return None;
         }
         let kept = plan.kept(now, located, pair, [&points.start, &points.end]);
         let [(a, _), (b, _)] = located;
         let shares = shares_at_rest(pair, points.times(), kept, plan.rounded(a, b));
         let skips = plan.start == Start::Skip;
         if shares.is_none() && skips && are_within(pair, &points.start, kept) {
-            return false;
+            return None;
         }
-        moving.for_each(|vertex| groups.join(first, vertex));
         // Without so much room they stay where they start.
-        self.stop_by(&points, &shares.unwrap_or([0.0; 4]))
+        Some((points, shares.unwrap_or([0.0; 4])))
     }
 }
 
