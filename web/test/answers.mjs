@@ -668,9 +668,9 @@ export async function others(module) {
   // Of the two triangles, all pairs with vertex 0 of both, by one list, and by one that lists it twice.
   const [from, listed] = [new Uint8Array([0, 1, 1, 1]), new Uint32Array([0])];
   const sewn = pile.vertexPairs(base, from, listed, top);
-  const named = await detector.near(pile, 1, { exclude: [sewn] });
+  const unsewn = await detector.near(pile, 1, { exclude: [sewn] });
   const twice = pile.vertexPairs(top, new Uint16Array([0, 2, 2, 2]), new Uint32Array([0, 0]), base);
-  left.sewn = [sewn.length, twice.length, named.length > 0 && named.length < every, (await count(twice)) === named.length];
+  left.sewn = [sewn.length, twice.length, unsewn.length > 0 && unsewn.length < every, (await count(twice)) === unsewn.length];
   left.own = (await count(pile.vertexPairs(base, from, listed))) === every;
   left.offsets = await refusal(() => count(pile.vertexPairs(base, new Uint8Array([0, 1, 1]), listed, top)));
   left.noVertex = await refusal(() => count(pile.vertexPairs(base, from, new Uint32Array([7]), top)));
