@@ -63,9 +63,9 @@ try {
 
   // A scene forgets pairs at rest that nobody holds.
   setFlagsFromString("--expose-gc");
-  const { RestPairs } = await import(join(installed, "query.js"));
+  const { KeptPairs } = await import(join(installed, "query.js"));
   const forgotten = [];
-  const [held] = [1, 2, 3].map((of) => new RestPairs(of, 0, () => forgotten.push(of)));
+  const [held] = [1, 2, 3].map((of) => new KeptPairs(of, 0, () => forgotten.push(of)));
   for (let turn = 0; turn < 1000 && forgotten.length < 2; turn += 1) {
     runInNewContext("gc")();
     await setTimeout(1);
