@@ -146,7 +146,10 @@ struct Through {
 pub fn runners(problem: &Problem, options: &Options) -> Result<Vec<Box<dyn Runner>>, Failure> {
     let mut runners: Vec<Box<dyn Runner>> = Vec::new();
     if let Some(library) = &options.c_library {
-        for threads in [options.threads, 1] {
+        // As the contestants in Rust: one thread, too, if no number is named.
+        let all = [options.threads, 1];
+        let n = if options.threads == 0 { 2 } else { 1 };
+        for &threads in &all[..n] {
             for feed in [Feed::Copied, Feed::Lent] {
                 runners.push(Box::new(Through::new(problem, library, threads, feed)?));
             }

@@ -5,44 +5,28 @@
 //! edge length apart. Pairs within a ring of the surface are left out. What is allowed is asked
 //! about, too: the way to truncated positions is free, and as many pairs are listed as are near.
 
-use impinge::{Detector, Exclusion, Positions, Query, Settings};
+use impinge::{Detector, Exclusion, Method, Positions, Query, Scene};
 use serde_json::json;
 
 use crate::report::{Report, figures, grouped};
-use crate::step_sizes::{Layers, SIZES, best};
+use crate::step_sizes::{Layers, best, each_size};
 use crate::{Failure, Options};
 
 /// The most that a vertex may move, and half of how far lists reach, in edge lengths.
 const MOST: f64 = 0.5;
 
-/// All sizes up to the one that the options name.
 pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
     let mut header =
         "| faces | near pairs | cut vertices | rounds | `near` ms | ns per face |".to_owned();
     for question in ["safe_distances", "neighbours", "impacts", "truncate"] {
         header += &format!(" `{question}` ms | ns per face |");
     }
-    header += "\n";
-    header += &"|---:".repeat(14);
-    report.say(&(header + "|"));
-    for n_faces in SIZES {
-        if options.size.is_none_or(|largest| n_faces <= largest) {
-            measure(Layers::new(n_faces)?, options, report)?;
-        }
-    }
-    report.say("");
-    Ok(())
+    each_size(header + "\n", options, report, measure)
 }
 
 fn measure(mut layers: Layers, options: &Options, report: &mut Report) -> Result<(), Failure> {
     let default = (1_000_000 / layers.n_faces).clamp(3, 50);
     let n_frames = options.frames.unwrap_or(default).max(1);
-    let settings = Settings::new()
-        .threads(options.threads)
-        .affinity(options.affinities[0])
-        .instruction_set(options.instruction_set)
-        .backend(options.backend);
-    let detector = || Detector::new(settings.clone());
     let query = Query::all().exclude(Exclusion::rings(1));
     let n_faces = layers.n_faces as f64;
     let most = MOST * layers.edge;
@@ -53,34 +37,36 @@ fn measure(mut layers: Layers, options: &Options, report: &mut Report) -> Result
         columns += &format!(" {} | {:.0} |", figures(ms), 1e6 * ms / n_faces);
         of_questions.insert(question.to_owned(), json!(ms));
     };
-    let mut near = detector()?;
-    let (ms, n_near) = best(&mut layers, n_frames, |scene| {
-        Ok(near.near(scene, 2.0 * most, &query)?.len())
-    })?;
-    add("near", ms);
-    drop(near);
-    let mut safe = detector()?;
-    let (ms, n_touching) = best(&mut layers, n_frames, |scene| {
-        Ok(safe.safe_distances(scene, most, &query)?.touching().len())
-    })?;
-    add("safe_distances", ms);
-    drop(safe);
-    let mut lists = detector()?;
-    let (ms, n_listed) = best(&mut layers, n_frames, |scene| {
-        Ok(lists.neighbours(scene, 2.0 * most, &query)?.len())
-    })?;
-    add("neighbours", ms);
-    drop(lists);
+    // How many pairs are near, touch, are listed, and meet.
+    type Count = fn(&mut Detector, &Scene, f64, &Query) -> Result<usize, impinge::Error>;
+    let counts: [(&str, Count); 4] = [
+        ("near", |by, scene, most, query| {
+            Ok(by.near(scene, 2.0 * most, query)?.len())
+        }),
+        ("safe_distances", |by, scene, most, query| {
+            Ok(by.safe_distances(scene, most, query)?.touching().len())
+        }),
+        ("neighbours", |by, scene, most, query| {
+            Ok(by.neighbours(scene, 2.0 * most, query)?.len())
+        }),
+        ("impacts", |by, scene, _, query| {
+            Ok(by.impacts(scene, query)?.len())
+        }),
+    ];
+    let mut found = [0; 4];
+    for (found, (question, count)) in found.iter_mut().zip(counts) {
+        let mut by = Detector::new(options.settings(Method::Auto))?;
+        let ms;
+        (ms, *found) = best(&mut layers, n_frames, |scene| {
+            Ok(count(&mut by, scene, most, &query)?)
+        })?;
+        add(question, ms);
+    }
+    let [n_near, n_touching, n_listed, _] = found;
     if n_listed > n_near || n_touching > 0 {
         return Err(format!("{n_faces} faces: {n_listed} listed, {n_near} near").into());
     }
-    let mut impacts = detector()?;
-    let (ms, _) = best(&mut layers, n_frames, |scene| {
-        Ok(impacts.impacts(scene, &query)?.len())
-    })?;
-    add("impacts", ms);
-    drop(impacts);
-    let mut stops = detector()?;
+    let mut stops = Detector::new(options.settings(Method::Auto))?;
     let (ms, truncation) = best(&mut layers, n_frames, |scene| {
         Ok(stops.truncate(scene, &query)?)
     })?;

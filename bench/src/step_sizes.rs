@@ -8,7 +8,7 @@
 
 use std::time::Instant;
 
-use impinge::{BodyId, Detector, Query, Scene, Settings};
+use impinge::{BodyId, Detector, Method, Query, Scene};
 use impinge_scenes::deform::{Deform, Wave};
 use impinge_scenes::surfaces;
 use serde_json::json;
@@ -17,7 +17,7 @@ use crate::report::{Report, figures, grouped};
 use crate::{Failure, Options};
 
 /// Faces of both layers.
-pub const SIZES: [usize; 7] = [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000];
+const SIZES: [usize; 7] = [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000];
 /// Without the candidates, which come last.
 const QUESTIONS: [&str; 3] = ["earliest", "is_free", "advance"];
 /// Frames before the clock counts.
@@ -108,13 +108,22 @@ pub fn best<T>(
     }
 }
 
-/// All sizes up to the one that the options name.
 pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
     let mut header = "| faces | impacts | candidates | `impacts` ms | ns per face |".to_owned();
     for question in QUESTIONS {
         header += &format!(" `{question}` ms | ns per face |");
     }
     header += " `candidates` ms | ns per candidate | bytes per element, `impacts` | without its answer | bytes per element, `candidates` |\n";
+    each_size(header, options, report, measure)
+}
+
+/// A table of all sizes up to the one that the options name, with 14 columns.
+pub fn each_size(
+    mut header: String,
+    options: &Options,
+    report: &mut Report,
+    measure: impl Fn(Layers, &Options, &mut Report) -> Result<(), Failure>,
+) -> Result<(), Failure> {
     header += &"|---:".repeat(14);
     report.say(&(header + "|"));
     for n_faces in SIZES {
@@ -129,15 +138,7 @@ pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
 fn measure(mut layers: Layers, options: &Options, report: &mut Report) -> Result<(), Failure> {
     let default = (3_000_000 / layers.n_faces).clamp(5, 100);
     let n_frames = options.frames.unwrap_or(default).max(1);
-    let detector = || {
-        Detector::new(
-            Settings::new()
-                .threads(options.threads)
-                .affinity(options.affinities[0])
-                .instruction_set(options.instruction_set)
-                .backend(options.backend),
-        )
-    };
+    let detector = || Detector::new(options.settings(Method::Auto));
     let query = Query::all();
     let n_faces = layers.n_faces as f64;
     let n_elements = layers.n_elements as f64;

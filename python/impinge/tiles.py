@@ -2,8 +2,8 @@
 
 Four steps work on one folder, and its files are all that they share: `plan`, `scatter`, `run`, `merge`. Any of them may run
 on any machine that sees the folder, in any number of processes. A step that was stopped is run again and ends with the same
-bytes. The answer is that of one `Detector` with all files in one scene, and has the same hash. `impinge.ray.tiles` runs the
-steps on a Ray cluster.
+bytes. The answer is that of one `Detector` with all files in one scene, and has the same hash; but of a step,
+vertices have the numbers of their files, of welded ones the first. `impinge.ray.tiles` runs the steps on a Ray cluster.
 """
 
 from __future__ import annotations

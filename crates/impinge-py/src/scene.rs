@@ -547,11 +547,12 @@ impl Scene {
         a: &Bound<'_, PyAny>,
         b: &Bound<'_, PyAny>,
     ) -> PyResult<Option<Overlap>> {
-        for (body, name) in [(a, "a"), (b, "b")] {
-            let checked = self.inner.check_positions(self.id(body, name)?);
-            checked.map_err(raise)?;
-        }
-        let bodies = [self.body(a)?, self.body(b)?];
+        let checked = |body| -> PyResult<&impinge::Body> {
+            let id = self.id(body, "body")?;
+            self.inner.check_positions(id).map_err(raise)?;
+            self.inner.body(id).map_err(raise)
+        };
+        let bodies = [checked(a)?, checked(b)?];
         Ok(py.detach(|| {
             let [a, b] = bodies.map(|body| -> Vec<[f64; 3]> {
                 let vertices = 0..body.n_vertices();

@@ -54,10 +54,9 @@ impl Detector {
     pub fn advance(&mut self, scene: &Scene, query: &Query) -> Result<Advance, Error> {
         let control = &self.control.clone();
         refuse_cell(query)?;
-        // Also those that the query is not about take their step.
-        scene.check_moving()?;
         let with_close = self.lists_close_pairs();
         let plan = Plan::advance(scene, query, with_close, self.limits_of_steps())?;
+        self.check_step(scene, &plan)?;
         let start = self.verify(scene, query)?;
         let seen = self.find_contacts(scene, &plan, control, (start, false))?;
         let contacts = self.steps.contacts.found();
@@ -76,6 +75,13 @@ impl Detector {
         };
         self.take_positions(scene, query, &plan, seen.close, control, &mut advance)?;
         Ok(advance)
+    }
+
+    /// Refuses positions that are not finite: of the bodies that are asked about, and of the others
+    /// that take the step.
+    pub(super) fn check_step(&self, scene: &Scene, plan: &Plan) -> Result<(), Error> {
+        plan.check(scene, self.runner.workers())?;
+        scene.check_moving()
     }
 
     /// Slots the bodies as far on their ways as they can be.

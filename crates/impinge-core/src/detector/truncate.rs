@@ -95,10 +95,9 @@ impl Detector {
     pub fn truncate(&mut self, scene: &Scene, query: &Query) -> Result<Truncation, Error> {
         refuse_cell(query)?;
         let begun = Instant::now();
-        // Also those that the query is not about take their step.
-        scene.check_moving()?;
         let plan_of = |scene: &Scene, limits| Plan::touching(scene, query, limits);
         let mut plan = plan_of(scene, self.limits_of_steps())?;
+        self.check_step(scene, &plan)?;
         let start = self.verify(scene, query)?.map(|start| start.intersects);
         let mut truncation = Truncation {
             start_intersects: start,
@@ -395,6 +394,11 @@ impl PairPoints {
     /// The places of those that move.
     fn moving(&self) -> impl Iterator<Item = usize> {
         (0..self.n).filter(|&ix| self.now[ix] != self.start[ix])
+    }
+
+    /// The numbers of the vertices that move.
+    fn movers(&self) -> impl Iterator<Item = usize> {
+        self.moving().map(|ix| self.own[ix])
     }
 
     /// At the start, now, and at the end.

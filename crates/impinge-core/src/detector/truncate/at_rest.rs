@@ -50,9 +50,10 @@ impl Detector {
         self.each_overlap((now, plan), |run, work| {
             those_of(&run, work, |pair| {
                 if let Some((points, _)) = vertices.at_rest(pair, (now, plan)) {
-                    let mut moving = points.moving().map(|ix| points.own[ix]);
-                    let first = moving.next();
-                    moving.for_each(|vertex| groups.join(first.unwrap_or(vertex), vertex));
+                    let mut movers = points.movers();
+                    if let Some(first) = movers.next() {
+                        movers.for_each(|vertex| groups.join(first, vertex));
+                    }
                 }
                 false
             })?;
@@ -64,8 +65,8 @@ impl Detector {
                 continue;
             };
             let points = vertices.points(&located(plan, pair, found.key), (now, plan));
-            if let Some(ix) = points.moving().next() {
-                meet[groups.of(points.own[ix])] = true;
+            if let Some(vertex) = points.movers().next() {
+                meet[groups.of(vertex)] = true;
             }
         }
         let mut stopped = PairList::new();
@@ -74,8 +75,8 @@ impl Detector {
                 let Some((points, shares)) = vertices.at_rest(pair, (now, plan)) else {
                     return false;
                 };
-                let mut moving = points.moving().map(|ix| points.own[ix]);
-                let meets = moving.next().is_some_and(|vertex| meet[groups.of(vertex)]);
+                let mut movers = points.movers();
+                let meets = movers.next().is_some_and(|vertex| meet[groups.of(vertex)]);
                 meets && vertices.stop_by(&points, &shares)
             })?;
             grow(&mut stopped, own.len(), WHAT)?;
