@@ -262,8 +262,9 @@ export declare class Scene {
    * The pairs of elements that are within a distance of each other now, mostly at rest, to be left out of later questions by `exclude`. They
    * are of the kinds that `near` has if none are named: `"vf"`, `"ee"`, edges with faces that they meet (`"ef"`), and between bodies without
    * faces `"ev"` and `"vv"` as said at `kinds`. Pairs of other kinds, which a query must name, are left out by bodies, rings or groups alone.
-   * Positions and thickness alone count: neither pinned vertices nor filters nor groups. Nothing is proven of pairs that are left out: they
-   * may pass through each other.
+   * `detect`, `count` and `any` leave out two of the elements that they are about, such as faces, if some corners, edges or faces of theirs
+   * are such a pair. Positions and thickness alone count: neither pinned vertices nor filters nor groups. Nothing is proven of pairs that are
+   * left out: they may pass through each other.
    * The scene keeps them until either is disposed of, or the pairs are collected as garbage. Questions about another scene refuse them.
    */
   restPairs(distance: number): RestPairs;

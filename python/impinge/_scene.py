@@ -426,7 +426,8 @@ class Scene(SceneBase):
     def rest_pairs(self, distance: SupportsFloat) -> Exclusion:
         """The pairs of elements that are within a distance of each other now, to be left out of later questions with ``exclude=``: in
         a pose at rest, what is near is meant to be. They are of the kinds that `Detector.near` has if none are named; those of other
-        kinds stay. Positions and thickness alone count: neither pinned vertices nor filters nor groups. All cores are used.
+        kinds stay. `Detector.detect`, `count` and `any` leave out the elements that they are about, such as faces, of which some corners,
+        edges or faces are such a pair. Positions and thickness alone count: neither pinned vertices nor filters nor groups. All cores are used.
 
         Nothing is proven of pairs that are left out: they may pass through each other.
 

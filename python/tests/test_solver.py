@@ -298,6 +298,16 @@ def test_what_is_left_out(detector):
         detector.near(scene, 0.3, exclude=scene.vertex_pairs(points, offsets, listed + 48))
     none = scene.vertex_pairs(points, np.zeros(49, int), [])
     assert len(detector.near(scene, 0.3, exclude=none)) == len(detector.near(scene, 0.3))
+    # Faces that were within the distance, of sheets that lie in one another now.
+    sheets = impinge.Scene()
+    bodies = [sheets.add(grid + [0, 0, z], faces) for z in (0, 0.25, 5)]
+    apart = sheets.rest_pairs(1.0)
+    for body in bodies[1:]:
+        sheets.set_positions(body, grid)
+    left = detector.detect(sheets, exclude=apart)
+    assert {(a, b) for a, _, b, _ in left.rows.tolist()} == {(0, 2), (1, 2)}
+    assert len(left) == detector.count(sheets) - detector.count(sheets, between=(bodies[0], bodies[1])) > 0
+    assert detector.any(sheets, exclude=apart) and not detector.any(sheets, exclude=sheets.rest_pairs(0.0))
     # Its pairs would be none in another scene.
     for foreign in [rest, sewn]:
         with pytest.raises(ValueError, match=r"^exclude\[1\]: of another scene"):
@@ -312,8 +322,6 @@ def test_what_is_left_out(detector):
     assert repr(query) == "Query(exclude=((0, 1), groups(1, 7), rings(2)))"
     with pytest.raises(TypeError, match="^an Exclusion of pairs names bodies"):
         pickle.dumps(rest)
-    with pytest.raises(ValueError, match="^exclude: "):
-        detector.detect(scene, exclude=rest)
     with pytest.raises(ValueError, match="^n: 17 given"):
         impinge.rings(17)
     with pytest.raises(TypeError, match="^exclude: a pair of bodies, an Exclusion, or a sequence of these, expected"):

@@ -312,7 +312,8 @@ typedef struct impinge_element {
  *   rest_pairs, n_rest_pairs
  *                       Answers of impinge_find_near whose pairs are left out: of the same scene, mostly at rest, with the kinds of
  *                       pairs that are to be left out, and found without pins and filters that would hide some. Those of another
- *                       scene are refused. Refused by questions about the elements that bodies were given as.
+ *                       scene are refused. Questions about the elements that bodies were given as leave out two of them if some
+ *                       corners, edges or faces of theirs are such a pair.
  *   passes, passes_user Which pairs of elements may collide, of steps: 0 for those to leave out. It is asked about pairs that are in
  *                       contact, or might be, by several threads at the same time, and must always say the same of one pair. The first
  *                       element is the one that the kind of the pair names first. NULL, the default: all.

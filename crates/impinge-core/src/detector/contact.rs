@@ -77,10 +77,10 @@ impl Detector {
     /// # Errors
     /// A body that is not in the scene, the same body twice, a body not made of triangles, a
     /// surface that is not closed, contacts without these two though they intersect; contacts of a
-    /// query that left out pairs of the two: in a cell, by groups or lists of vertices, or because
-    /// faces of both were [pinned](Scene::set_pinned); contacts of pairs some of which
-    /// [`retain`](Pairs::retain) dropped; a body that was moved or re-meshed since the pairs were found
-    /// ([`Error::Moved`]).
+    /// query that left out pairs of the two: in a cell, by groups, by lists of vertices, by pairs of
+    /// an answer, or because faces of both were [pinned](Scene::set_pinned); contacts of pairs some
+    /// of which [`retain`](Pairs::retain) dropped; a body that was moved or re-meshed since the pairs
+    /// were found ([`Error::Moved`]).
     pub fn penetration(
         &mut self,
         scene: &Scene,

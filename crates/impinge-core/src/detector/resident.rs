@@ -122,6 +122,7 @@ impl Gpu<'_> {
                 allowed: "only detect, count and any",
             });
         }
+        query.check_without_pairs()?;
         let plan = Plan::intersections(scene, query, Goal::All, self.detector.settings.limits())?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::query::goal::{Goal, Limits};
 use crate::query::pair_kind::PairKind;
-use crate::query::pair_set::{PairSet, SortedKeys};
+use crate::query::pair_set::{PairSet, PairsOfElements, SortedKeys};
 use crate::query::{Exclusion, Query};
 use crate::scene::Scene;
 use crate::scene::body::are_all_pinned;
@@ -29,6 +29,8 @@ pub(crate) struct LeftOut {
     groups: BTreeSet<(u32, u32)>,
     vertices: Vec<VertexList>,
     pairs: Vec<SortedKeys>,
+    /// The same, of the question which elements intersect, which has no such pairs itself.
+    of_elements: Vec<Arc<PairsOfElements>>,
 }
 
 /// For each vertex of one body, vertices of another, or of the same.
@@ -100,6 +102,8 @@ impl Gaps {
             Some("groups")
         } else if left_out.vertices.iter().any(is_listed) {
             Some("lists of vertices")
+        } else if left_out.of_elements.iter().any(|of| of.are_of([a, b])) {
+            Some("pairs of an answer")
         } else {
             of.iter().all(has_pinned).then_some("pinned faces of both")
         }
@@ -290,10 +294,14 @@ impl Plan {
                 vertices.push(VertexList { bodies, lists });
             }
         }
+        let is_of_elements = self.question == Question::Intersection;
         let asked = self.kinds_asked();
         let takes_part = |body: BodyId, of: Part| {
-            let mut kinds = PairKind::ALL.into_iter();
             let mut parts = self.parts.iter();
+            if is_of_elements {
+                return parts.any(|part| part.id == body);
+            }
+            let mut kinds = PairKind::ALL.into_iter();
             kinds.any(|kind| asked.contains(kind) && kind.parts().contains(&of))
                 && parts.any(|part| part.id == body && part.part == of)
         };
@@ -315,12 +323,18 @@ impl Plan {
                 .map(|part| (part.id, part.part, part.first))
         };
         let keys = |pairs: &PairSet| pairs.keys(numbered().collect());
+        let sets = query.pairs.iter();
+        let (pairs, of_elements) = match is_of_elements {
+            true => (vec![], sets.map(|set| set.of_elements(scene)).collect()),
+            false => (sets.map(keys).collect(), vec![]),
+        };
         self.left_out = Some(Arc::new(LeftOut {
             is_marked: has_pinned || !query.groups.is_empty(),
             parts: self.part_ixs().map(of_part).collect(),
             groups: query.groups.clone(),
             vertices,
-            pairs: query.pairs.iter().map(keys).collect(),
+            pairs,
+            of_elements,
         }));
         Ok(())
     }
@@ -405,13 +419,21 @@ impl Plan {
     /// Whether a pair is left out, by its key alone.
     #[inline(never)]
     pub(super) fn is_key_left_out(&self, scene: &Scene, key: u64) -> bool {
-        let [a, b] = self.located(key);
-        let [a, b] = [&a, &b].map(|(part, element)| {
+        let located = self.located(key);
+        let pair = [&located[0], &located[1]].map(|(part, element)| {
             let corners = self
                 .body(scene, *part)
                 .corners(self.part(*part).part, element);
             (*part, corners)
         });
-        self.is_left_out(key, [a, b])
+        if self.is_left_out(key, pair) {
+            return true;
+        }
+        let left_out = self.left_out.as_deref();
+        let mut of_elements = left_out.map_or(&[][..], |of| &of.of_elements).iter();
+        of_elements.any(|set| {
+            let bodies = pair.map(|(part, _)| self.part(part).id);
+            set.has(bodies, [0, 1].map(|ix| (located[ix].1, pair[ix].1)))
+        })
     }
 }

@@ -216,7 +216,6 @@ impl Plan {
             _ => limits,
         };
         query.check_without_kinds()?;
-        query.check_without_pairs()?;
         query.check_without_filter()?;
         Plan::of(scene, query, Question::Intersection, goal, limits)
     }

@@ -297,9 +297,11 @@ impl Query {
     /// [`nearest`](crate::Detector::nearest).
     ///
     /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and
-    /// [`any`](crate::Detector::any) find all pairs first and leave out rings, groups, lists and
-    /// pinned vertices then: limits count what is left out, too. They are about the elements that
-    /// bodies were given as, and refuse pairs of an answer, also in frames that stay on a device.
+    /// [`any`](crate::Detector::any) find all pairs first and leave out what is left out then:
+    /// limits count it, too. They are about the elements that bodies were given as. Of these, pairs
+    /// of an answer leave out those that have such a pair among themselves, their corners, edges
+    /// and faces: those that were within its distance, if it was asked about all kinds that matter.
+    /// Frames that stay on a device refuse pairs of an answer, and
     /// [`nearest`](crate::Detector::nearest) refuses all but bodies.
     ///
     /// ```
@@ -550,14 +552,14 @@ impl Query {
         (!self.pairs.is_empty()).then_some("pairs of vertices, edges and faces")
     }
 
-    /// Refuses pairs of an answer, for questions about the elements that bodies were given as.
+    /// Refuses pairs of an answer, for frames that stay on a device.
     pub(crate) fn check_without_pairs(&self) -> Result<(), Error> {
         match self.pairs.is_empty() {
             true => Ok(()),
             false => Err(Error::Setting {
                 setting: "exclude",
                 given: "pairs of vertices, edges and faces".to_owned(),
-                allowed: "in this question only bodies, rings, groups and lists of vertices",
+                allowed: "in a frame that stays on a device only bodies, rings, groups and lists of vertices",
             }),
         }
     }

@@ -472,19 +472,162 @@ fn pairs_of_an_answer_are_left_out() {
     let query = Query::all().exclude(&at_rest).exclude(Exclusion::rings(1));
     let rings = Query::all().exclude(Exclusion::rings(1));
     check(&scene, &query, &scene, &rings, false, keeps);
-    let error = detector.detect(&scene, &query).expect_err("refused");
-    assert!(matches!(
-        error,
-        Error::Setting {
-            setting: "exclude",
-            ..
-        }
-    ));
-    // The look at the start of a step leaves out what it can.
+    // The look at the start of a step is at pairs of an answer, too.
     let query = query.start(Start::Verify);
-    detector.is_free(&scene, &query).expect("good");
+    let free = detector.advance(&scene, &query).expect("good");
+    assert_eq!(free.start_intersects, Some(true));
     assert_eq!(query, query.clone());
     assert_ne!(query, rings);
+}
+
+/// Faces that were near at rest, and later intersect, by the corners of what was near.
+fn check_elements_at_rest(rest: &Scene, moved: &Scene) {
+    let mut n_left_out = [0; 2];
+    for mut detector in detectors() {
+        let at_rest = detector.near(rest, 0.05, &Query::all()).expect("good");
+        let named: Vec<([BodyId; 2], [Vec<u32>; 2])> = at_rest
+            .iter()
+            .map(|pair| {
+                let named = (pair.kind.parts(), [pair.a, pair.b]);
+                ([pair.a.body, pair.b.body], corners_of_both(rest, &named))
+            })
+            .collect();
+        let has = |[a, b]: [Element; 2]| {
+            let pair = [a, b].map(|of| corners(moved, Part::Given, of));
+            let holds = |of: usize, named: &[u32]| named.iter().all(|at| pair[of].contains(at));
+            let bodies = [a.body, b.body];
+            named.iter().any(|(of, [first, second])| {
+                (*of == bodies && holds(0, first) && holds(1, second))
+                    || (*of == [bodies[1], bodies[0]] && holds(1, first) && holds(0, second))
+            })
+        };
+        for all in [Query::all(), Query::self_all(), Query::between_all()] {
+            let pairs = detector.detect(moved, &all).expect("good");
+            let expected: Vec<_> = pairs.iter().filter(|&(a, b)| !has([a, b])).collect();
+            let query = all.exclude(&at_rest);
+            let found = detector.detect(moved, &query).expect("good");
+            assert_eq!(found.iter().collect::<Vec<_>>(), expected);
+            let n = detector.count(moved, &query).expect("good");
+            assert_eq!(n, expected.len() as u64);
+            assert_eq!(detector.any(moved, &query).expect("good"), n > 0);
+            n_left_out[0] += pairs.len() - found.len();
+            n_left_out[1] += found.len();
+        }
+    }
+    assert!(n_left_out.iter().all(|&n| n > 20), "{n_left_out:?}");
+}
+
+/// The scene where its bodies are at the end of their step.
+fn at_end(scene: &Scene) -> Scene {
+    let mut moved = scene.clone();
+    for (id, body) in scene.bodies() {
+        if let Some(end) = body.end_positions() {
+            moved.set_positions(id, end).expect("good");
+        }
+    }
+    moved
+}
+
+#[test]
+fn elements_that_were_near_are_left_out_of_intersections() {
+    let (rest, _) = scene(12);
+    let moved = at_end(&rest);
+    check_elements_at_rest(&rest, &moved);
+    // Of faces without a common vertex, these are the ones that were within the distance.
+    let mut detector = detectors().into_iter().next().expect("some");
+    let [mut near, mut shares] = [BTreeSet::new(), BTreeSet::new()];
+    let faces = Query::all().kinds([PairKind::FaceFace]);
+    for pair in &detector.near(&rest, 0.05, &faces).expect("good") {
+        near.insert((pair.a, pair.b));
+    }
+    let at_rest = detector.near(&rest, 0.05, &Query::all()).expect("good");
+    let all = detector.detect(&moved, &Query::all()).expect("good");
+    for (a, b) in all.iter() {
+        let [of_a, of_b] = [a, b].map(|of| corners(&moved, Part::Given, of));
+        if a.body == b.body && of_a.iter().any(|at| of_b.contains(at)) {
+            shares.insert((a, b));
+        }
+    }
+    let query = Query::all().exclude(&at_rest);
+    let found = detector.detect(&moved, &query).expect("good");
+    let apart = |pair: &(Element, Element)| !shares.contains(pair);
+    let expected: Vec<_> = all
+        .iter()
+        .filter(|pair| apart(pair) && !near.contains(pair))
+        .collect();
+    assert_eq!(found.iter().filter(apart).collect::<Vec<_>>(), expected);
+    // Everything that intersects is near.
+    let now = detector.near(&moved, 0.0, &Query::all()).expect("good");
+    let query = Query::between_all().exclude(&now);
+    assert!(!detector.any(&moved, &query).expect("good"));
+    assert!(detector.any(&moved, &Query::between_all()).expect("good"));
+}
+
+/// Of all kinds of bodies, of edges that have their own numbers, and of bodies that are gone.
+#[test]
+fn elements_of_all_kinds_that_were_near_are_left_out() {
+    let mut random = Random::new(5);
+    let (mut rest, [cloth, ball]) = scene(6);
+    let block = solids::block(3, 3, 2, 0.4);
+    let block = block.add_to(&mut rest).expect("good");
+    let some = |random: &mut Random, n: usize| -> Vec<[f32; 3]> {
+        (0..n).map(|_| random.point(-0.6, 0.6)).collect()
+    };
+    let ends: Vec<[u32; 2]> = (0..40).map(|ix| [2 * ix, 2 * ix + 1]).collect();
+    let lines = rest.add_edges(&ends, &some(&mut random, 80)).expect("good");
+    rest.add_points(&some(&mut random, 30)).expect("good");
+    let edges = rest.body(cloth).expect("held").edges();
+    let mut own: Vec<[u32; 2]> = (0..edges.len())
+        .map(|ix| [1, 0].map(|end| edges.corners(ix)[end]))
+        .collect();
+    own.reverse();
+    rest.set_edges(cloth, &own).expect("good");
+    let mut moved = at_end(&rest);
+    moved
+        .set_positions(lines, &some(&mut random, 80))
+        .expect("good");
+    let n = moved.body(block).expect("held").n_vertices();
+    moved
+        .set_positions(block, &some(&mut random, n))
+        .expect("good");
+    check_elements_at_rest(&rest, &moved);
+    // The answer names a body that one clone no longer has.
+    let mut detector = detectors().into_iter().next().expect("some");
+    let at_rest = detector.near(&rest, 0.05, &Query::all()).expect("good");
+    let query = Query::all().exclude(&at_rest);
+    let mut fewer = moved.clone();
+    fewer.remove(ball).expect("held");
+    let afresh = Query::all().exclude(&at_rest);
+    let n = detector.count(&moved, &afresh).expect("good");
+    let counts = [&fewer, &moved, &fewer].map(|of| detector.count(of, &query).expect("good"));
+    assert!(counts[0] < n, "{counts:?}");
+    assert_eq!(counts, [counts[0], n, counts[0]]);
+    let alone = Query::all().exclude((ball, ball)).exclude(&at_rest);
+    let of_others = detector.detect(&moved, &alone).expect("good");
+    let others = of_others
+        .iter()
+        .filter(|(a, b)| a.body != ball && b.body != ball);
+    assert_eq!(others.count() as u64, counts[0]);
+    // Elements that have other numbers than those that were near.
+    let mut other = moved.clone();
+    own.rotate_left(1);
+    other.set_edges(cloth, &own).expect("good");
+    for question in [
+        detector.detect(&other, &query).map(drop),
+        detector.count(&other, &query).map(drop),
+        detector.any(&other, &query).map(drop),
+    ] {
+        let error = question.expect_err("other numbers");
+        assert!(
+            matches!(error, Error::Remeshed { body } if body == cloth),
+            "{error}"
+        );
+    }
+    assert!(
+        detector
+            .detect(&other, &Query::self_of(ball).exclude(&at_rest))
+            .is_ok()
+    );
 }
 
 #[test]
