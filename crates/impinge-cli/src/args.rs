@@ -15,11 +15,12 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
-use impinge::{Backend, Method, SharedVertex};
+use impinge::{Backend, Method, Query, Scene, SharedVertex};
 
 use crate::commands::{
     CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FIX_EXAMPLES, FixArgs, TILES_EXAMPLES, TilesArgs,
 };
+use crate::error::Error;
 use crate::values::PngFile;
 use crate::values::{
     CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, at_least_one, body_length,
@@ -336,6 +337,26 @@ pub struct ExcludeArgs {
     pub rings: Option<u32>,
 }
 
+/// Pairs that are left out because they are near at rest.
+#[derive(Debug, Clone, Default, Args)]
+pub struct RestArgs {
+    /// Leave out pairs that are at most R apart, a length, before anything moves. Of elements that
+    /// intersect those whose corners, edges or faces are such a pair. Nothing is proven of them:
+    /// they may pass through each other
+    #[arg(id = "exclude_rest", long = "exclude-rest", value_name = "R", value_parser = distance, allow_negative_numbers = true)]
+    pub distance: Option<f64>,
+}
+
+impl RestArgs {
+    /// The query without the pairs that are near in a scene.
+    pub fn leave_out(&self, query: Query, scene: &Scene) -> Result<Query, Error> {
+        Ok(match self.distance {
+            Some(distance) => query.exclude(scene.rest_pairs(distance)?),
+            None => query,
+        })
+    }
+}
+
 /// How thick bodies are.
 #[derive(Debug, Clone, Default, Args)]
 pub struct ThicknessArgs {
@@ -502,6 +523,8 @@ pub struct SequenceArgs {
     pub step: StepHow,
     #[command(flatten)]
     pub ask: AskArgs,
+    #[command(flatten)]
+    pub rest: RestArgs,
     // These come last: their headings would hold for what follows.
     #[command(flatten)]
     pub picture: PictureArgs,

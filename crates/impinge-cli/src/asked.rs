@@ -24,6 +24,8 @@ pub struct Asked {
     pub excludes: bool,
     /// How near pairs that were left out are in the surface.
     pub rings: Option<u32>,
+    /// How far pairs that were left out were apart at rest.
+    pub rest: Option<f64>,
     /// Whether kinds of pairs were chosen.
     pub has_kinds: bool,
 }
@@ -103,6 +105,9 @@ impl Asked {
                 "what is at most {} away in the surface",
                 counted(n.into(), "edge")
             ));
+        }
+        if let Some(distance) = self.rest {
+            not_asked.push(format!("what is at most {distance} apart at rest"));
         }
         if self.has_kinds {
             not_asked.push("other kinds of pairs (--kinds)".to_owned());
@@ -208,6 +213,7 @@ mod tests {
         has_self: true,
         excludes: false,
         rings: None,
+        rest: None,
         has_kinds: false,
     };
 
@@ -252,6 +258,7 @@ mod tests {
             shared_vertex: SharedVertex::Skip,
             excludes: true,
             rings: Some(2),
+            rest: Some(0.25),
             ..ASKED
         };
         assert_eq!(
@@ -264,7 +271,7 @@ mod tests {
                 }
             ),
             "between 2 nodes of a.glb, vertices as in the files, neighbours left out; not asked: self-collision (--self), what --exclude \
-             names, what is at most 2 edges away in the surface"
+             names, what is at most 2 edges away in the surface, what is at most 0.25 apart at rest"
         );
         let three = [of(Some(0), Some(0)); 3];
         let only = Asked {

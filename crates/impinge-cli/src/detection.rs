@@ -81,6 +81,7 @@ pub fn asked((between, within): (bool, bool), args: &AskArgs) -> Asked {
         has_self: true,
         excludes: !args.exclude.bodies.is_empty(),
         rings: args.exclude.rings,
+        rest: None,
         has_kinds: false,
     }
 }

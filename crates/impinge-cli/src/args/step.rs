@@ -7,7 +7,7 @@ use clap::Args;
 use impinge::{PairKind, Precision, Query, Start};
 
 use super::{
-    DetectorArgs, ExcludeArgs, RowsArgs, ShownArgs, ThicknessArgs, kind, precision, start,
+    DetectorArgs, ExcludeArgs, RestArgs, RowsArgs, ShownArgs, ThicknessArgs, kind, precision, start,
 };
 use crate::asked::Question;
 use crate::detection::of_kinds;
@@ -64,6 +64,8 @@ pub struct StepArgs {
     pub no_weld: bool,
     #[command(flatten)]
     pub exclude: ExcludeArgs,
+    #[command(flatten)]
+    pub rest: RestArgs,
     /// End with exit code 3 unless the step is free (4 if the start intersects, with or without
     /// this option)
     #[arg(long, conflicts_with = "candidates")]

@@ -35,7 +35,10 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         return Err(Error::Usage(text.to_owned()));
     }
     let is_alone = args.others.is_empty();
-    let asked = asked((!is_alone, args.within || is_alone), &args.ask);
+    let asked = Asked {
+        rest: args.rest.distance,
+        ..asked((!is_alone, args.within || is_alone), &args.ask)
+    };
     // Where nothing depends on welding, frames may come apart.
     let weld = args.ask.read.weld().or((!asked.within).then_some(false));
     let loading = Loading::new(&args.ask, asked.within, cancel);
@@ -60,6 +63,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     } = bodies;
     thicken(&mut scene, &ids, &args.step.thickness)?;
     let query = query(asked, &args.ask.exclude, &ids)?;
+    let query = args.rest.leave_out(query, &scene)?;
     let bodies: Vec<(BodyId, &str)> = ids
         .into_iter()
         .zip(names.iter().map(String::as_str))

@@ -43,7 +43,8 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     let mut bodies = Moving::read(args, cancel)?;
     thicken(&mut bodies.scene, &bodies.ids, &args.how.thickness)?;
     let asked = asked(args, &bodies)?;
-    let step = args.how.of(query(asked, &args.exclude, &bodies.ids)?);
+    let query = query(asked, &args.exclude, &bodies.ids)?;
+    let step = args.how.of(args.rest.leave_out(query, &bodies.scene)?);
 
     let watch = Watch::detection(!args.detector.no_progress, "detecting");
     detector.set_control(watch.control(cancel));
@@ -160,6 +161,7 @@ fn asked(args: &StepArgs, bodies: &Moving) -> Result<Asked, Error> {
         has_self: false,
         excludes: !args.exclude.bodies.is_empty(),
         rings: args.exclude.rings,
+        rest: args.rest.distance,
         has_kinds: !args.how.kinds.is_empty(),
     })
 }

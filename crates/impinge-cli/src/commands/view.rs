@@ -80,6 +80,7 @@ fn save(
         has_self: true,
         excludes: false,
         rings: None,
+        rest: None,
         has_kinds: false,
     };
     writeln!(to, "{}", asked.line(&vertices, &nouns))?;

@@ -710,3 +710,88 @@ fn a_start_that_intersects_is_never_free() {
     let run = folder.run(["step", "fold.obj", "fold.obj", "--fail-on-hit"]);
     assert_eq!(run.code, Some(4), "{}", run.stdout);
 }
+
+/// Two sheets that lie close to each other at first, and a third one that comes from afar.
+#[test]
+fn what_is_near_at_rest_is_left_out() {
+    let folder = Folder::new();
+    let sheet = |low: f64, high: f64| {
+        let corners = [
+            [0.0, 0.0, low],
+            [2.0, 0.0, high],
+            [0.0, 2.0, low],
+            [2.0, 2.0, high],
+        ];
+        let vertices = corners.map(|[x, y, z]| format!("v {x} {y} {z}\n"));
+        vertices.concat() + "f 1 2 3\nf 2 4 3\n"
+    };
+    folder.text("floor.obj", &sheet(0.0, 0.0));
+    folder.text("rest.obj", &sheet(0.125, 0.125));
+    folder.text("far.obj", &sheet(3.0, 3.0));
+    // Half of it below the floor.
+    folder.text("f0.obj", &sheet(0.125, 0.25));
+    folder.text("f1.obj", &sheet(0.25, -0.125));
+    let step = [
+        "step",
+        "floor.obj",
+        "floor.obj",
+        "rest.obj",
+        "f1.obj",
+        "far.obj",
+        "f1.obj",
+        "--no-self",
+    ];
+    let impacts = |more: &[&str]| {
+        let text = folder.run(step.iter().chain(more).chain(&["--rows", "-"]));
+        let bodies = |row: &str| {
+            let row: Vec<&str> = row.split(',').collect();
+            (row[1].to_owned(), row[3].to_owned())
+        };
+        let pairs: std::collections::BTreeSet<_> =
+            text.printed().lines().skip(1).map(bodies).collect();
+        pairs.into_iter().map(|(a, b)| a + &b).collect::<Vec<_>>()
+    };
+    let all = impacts(&[]);
+    assert!(
+        all.contains(&"10".to_owned()) || all.contains(&"01".to_owned()),
+        "{all:?}"
+    );
+    assert_eq!(impacts(&["--exclude-rest", "0.0625"]), all);
+    let few = impacts(&["--exclude-rest", "0.125"]);
+    assert!(few.iter().all(|pair| pair.contains('2')), "{few:?}");
+    assert!(!few.is_empty() && few.len() < all.len());
+    let moved = [
+        "step",
+        "floor.obj",
+        "floor.obj",
+        "rest.obj",
+        "f1.obj",
+        "--no-self",
+    ];
+    let check = |more: &[&str]| folder.run(moved.iter().chain(&["--fail-on-hit"]).chain(more));
+    assert_eq!(check(&[]).code, Some(3));
+    let text = check(&["--exclude-rest", "0.125"]).printed();
+    let said = "not asked: self-collision, what is at most 0.125 apart at rest";
+    assert!(text.starts_with("free: ") && text.contains(said), "{text}");
+    // In a sequence, at rest is the mesh, whatever its first frame is.
+    let sequence = ["sequence", "rest.obj", "f%d.obj", "--other", "floor.obj"];
+    let pairs = |more: &[&str]| {
+        let run = folder.run(sequence.iter().chain(&["--json"]).chain(more));
+        let lines = run.printed();
+        let pairs = lines.lines().map(|line| {
+            let line: Value = serde_json::from_str(line).unwrap();
+            line["pairs"].as_u64().unwrap()
+        });
+        pairs.collect::<Vec<_>>()
+    };
+    let all = pairs(&[]);
+    assert!(all[0] == 0 && all[1] > 0, "{all:?}");
+    assert_eq!(pairs(&["--exclude-rest", "0.0625"]), all);
+    assert_eq!(pairs(&["--exclude-rest", "0.125"]), [0, 0]);
+    let text = folder.run(sequence.iter().chain(&["--ccd", "--exclude-rest", "0.125"]));
+    let text = text.printed();
+    assert!(text.contains("1 step, 1 free of contact\n") && text.contains("apart at rest"));
+    folder
+        .run(moved.iter().chain(&["--exclude-rest", "-1"]))
+        .misuse();
+}

@@ -6,9 +6,9 @@ use super::steps::NearList;
 use crate::answers::near::{Labels, NearPairs};
 use crate::cpu::steps::VerletList;
 use crate::plan::{Plan, TestId};
-use crate::query::Query;
 use crate::query::pair_kind::PairKind;
-use crate::query::settings::Settings;
+use crate::query::settings::{Backend, Settings};
+use crate::query::{Exclusion, Query};
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::search::found::KeysByKind;
@@ -24,6 +24,37 @@ use crate::workers::clock::Instant;
 const TASK: usize = 1024;
 /// Questions whose pairs are listed: a solver asks few different ones.
 const MOST_LISTS: usize = 4;
+
+impl Scene {
+    /// The pairs of elements that are within a distance of each other now, to be left out of later
+    /// questions by [`Query::exclude`]: in a pose at rest, what is near is meant to be. They are of
+    /// the kinds that [`Detector::near`] has if none are named. Positions and thickness alone
+    /// count: neither [pinned](Scene::set_pinned) vertices, nor [groups](Scene::set_groups), nor
+    /// [`Filter`](crate::Filter)s. For pairs of other kinds, exclude those of an answer of `near`.
+    ///
+    /// Nothing is proven of pairs that are left out: they may pass through each other.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let strip: Vec<[f32; 3]> = (0..12).map(|i| [(i / 2) as f32, (i % 2) as f32, 0.0]).collect();
+    /// let faces: Vec<[u32; 3]> = (0..10).map(|i| [i, i + 1, i + 2]).collect();
+    /// scene.add_triangles(&faces, &strip)?;
+    /// let query = Query::all().exclude(scene.rest_pairs(1.0)?);
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// assert!(detector.near(&scene, 1.0, &query)?.is_empty());
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// Refused positions, a distance that is negative or not finite, no memory.
+    pub fn rest_pairs(&self, distance: f64) -> Result<Exclusion, Error> {
+        let mut detector = Detector::new(Backend::Cpu)?;
+        let near = detector.near(&self.at_rest(), distance, &Query::all())?;
+        Ok(Exclusion::from(&near))
+    }
+}
 
 impl Detector {
     /// All pairs of elements whose distance is at most `distance` plus the

@@ -553,6 +553,7 @@ impl Query {
     }
 
     /// Refuses pairs of an answer, for frames that stay on a device.
+    #[cfg(feature = "gpu")]
     pub(crate) fn check_without_pairs(&self) -> Result<(), Error> {
         match self.pairs.is_empty() {
             true => Ok(()),
