@@ -31,6 +31,21 @@ impl Origin {
         self.in_file(first.unwrap_or(vertex))
     }
 
+    /// The number in the file of each vertex of the body; `None` if they are the same.
+    #[cfg(feature = "view")]
+    pub fn numbers(&self) -> Option<Arc<[u32]>> {
+        let numbers = match (&self.weld, &self.read) {
+            (Some(weld), _) => weld
+                .firsts()
+                .iter()
+                .map(|&first| self.in_file(first))
+                .collect(),
+            (None, Some(read)) => read.as_slice().into(),
+            (None, None) => return None,
+        };
+        Some(numbers)
+    }
+
     /// The vertex of the body for each vertex that was read; `None` if they are the same.
     pub fn map(&self) -> Option<&[u32]> {
         self.weld.as_ref().map(|weld| weld.map())
@@ -134,6 +149,8 @@ mod tests {
         let weld = Arc::new(Weld::by_position(&Positions::F32(vec![a, a, b, a])));
         let origin = Origin::new(Some(vec![2, 3, 5, 9]), Some(&weld));
         assert_eq!([0, 1].map(|vertex| origin.vertex(vertex)), [2, 5]);
+        #[cfg(feature = "view")]
+        assert_eq!(origin.numbers().as_deref(), Some(&[2, 5][..]));
         let all: Vec<_> = origin.vertices(2).collect();
         assert_eq!(all, [(2, 0), (3, 0), (5, 1), (9, 0)]);
         let mut origins = Origins::default();

@@ -75,6 +75,7 @@ fn content(n_triangles: usize) -> Result<Content, String> {
             id,
             name: format!("ball {}", bodies.len()),
             colors,
+            vertices: None,
         });
     }
     let frames = Drifting {

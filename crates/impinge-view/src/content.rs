@@ -14,6 +14,18 @@ pub struct Shown {
     pub name: String,
     /// Its colours.
     pub colors: Colors,
+    /// The number of each of its vertices for the user, such as that in the file of a mesh that was
+    /// welded; `None` if it is that in the scene.
+    pub vertices: Option<Arc<[u32]>>,
+}
+
+impl Shown {
+    /// The number of a vertex for the user.
+    pub(crate) fn vertex(&self, vertex: u32) -> u32 {
+        let all = self.vertices.as_ref();
+        let number = all.and_then(|all| all.get(vertex as usize).copied());
+        number.unwrap_or(vertex)
+    }
 }
 
 /// Bodies, and where they are in each frame.

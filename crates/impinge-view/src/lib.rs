@@ -9,7 +9,7 @@
 //!     let mut scene = Scene::new();
 //!     let id = scene.add_triangles(&faces, &positions).map_err(|error| error.to_string())?;
 //!     let colors = impinge_render::Colors { colliding: [214, 39, 40], other: [200; 3] };
-//!     let shown = vec![Shown { id, name: "cloth".to_owned(), colors }];
+//!     let shown = vec![Shown { id, name: "cloth".to_owned(), colors, vertices: None }];
 //!     Ok(Content { scene, bodies: shown, frames: None, missing: None })
 //! };
 //! impinge_view::show(load, Options::default())

@@ -304,10 +304,10 @@ fn selection(ui: &mut Ui, session: &mut Session) {
     let partners = session.partners();
     let bodies = &session.stage.content.bodies;
     let name = |body: usize| bodies.get(body).map_or("", |shown| short(&shown.name));
-    let held = bodies
-        .get(body)
-        .and_then(|shown| session.stage.scene().body(shown.id).ok());
-    let Some(held) = held else {
+    let Some(shown) = bodies.get(body) else {
+        return;
+    };
+    let Ok(held) = session.stage.scene().body(shown.id) else {
         return;
     };
     let corners = held.elements().corners(element as usize);
@@ -317,7 +317,7 @@ fn selection(ui: &mut Ui, session: &mut Session) {
         name(body),
         corners
             .iter()
-            .map(u32::to_string)
+            .map(|&vertex| shown.vertex(vertex).to_string())
             .collect::<Vec<_>>()
             .join(", ")
     );

@@ -39,6 +39,7 @@ fn shown(scene: &Scene) -> Vec<Shown> {
             id,
             name: name.to_owned(),
             colors,
+            vertices: None,
         })
         .collect()
 }
@@ -269,7 +270,15 @@ fn a_drag_beside_the_bodies_turns_the_view_and_leaves_the_pairs() {
 
 #[test]
 fn a_click_names_a_triangle_and_its_partners() {
-    let mut harness = open_content(still(600, 0.5));
+    let mut content = still(600, 0.5);
+    // As in a file with other vertices before those of each body, and between them.
+    let number = |body: usize, vertex: u32| 1000 * (body as u32 + 1) + 2 * vertex;
+    let scene = content.scene.clone();
+    for (ix, (shown, (_, body))) in content.bodies.iter_mut().zip(scene.bodies()).enumerate() {
+        let all = 0..body.n_vertices() as u32;
+        shown.vertices = Some(all.map(|vertex| number(ix, vertex)).collect());
+    }
+    let mut harness = open_content(content);
     assert_eq!(harness.state().selected(), None);
     for pressed in [true, false] {
         harness.hover_at(middle(false));
@@ -283,7 +292,16 @@ fn a_click_names_a_triangle_and_its_partners() {
     harness.run_steps(2);
     let (body, element) = harness.state().selected().expect("a triangle is there");
     let name = ["first", "second"][body];
-    let text = format!("triangle {element} of {name} (body {body})");
+    let (_, held) = scene.bodies().nth(body).expect("a body");
+    let corners = held.elements().corners(element as usize);
+    let corners: Vec<String> = corners
+        .iter()
+        .map(|&vertex| number(body, vertex).to_string())
+        .collect();
+    let text = format!(
+        "triangle {element} of {name} (body {body})\nvertices {}\n",
+        corners.join(", ")
+    );
     let found = harness.query_all_by_label_contains(&text).count();
     assert_eq!(found, 1, "{text}");
     look(&mut harness, "selected");

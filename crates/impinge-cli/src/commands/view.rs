@@ -19,6 +19,7 @@ use crate::commands::demo_scene::DemoScene;
 use crate::error::Error;
 use crate::files::{Files, FrameFiles};
 use crate::load::{Bodies, Loading, Nouns, Vertices};
+use crate::origins::Origin;
 use crate::output::out;
 use crate::watch::go_on;
 use crate::{headline, palette};
@@ -185,12 +186,11 @@ fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<(Content, Vec<Vertic
         return Err(Error::View(missing.join("\n")));
     }
     loading.check(has_parts)?;
-    let shown = bodies
-        .ids
-        .iter()
-        .zip(bodies.names)
-        .enumerate()
-        .map(|(ix, (&id, name))| shown(ix, id, name));
+    let named = bodies.ids.iter().zip(bodies.names).enumerate();
+    let shown = named.map(|(ix, (&id, name))| Shown {
+        vertices: bodies.origins.of(ix).and_then(Origin::numbers),
+        ..shown(ix, id, name)
+    });
     let content = Content {
         bodies: shown.collect(),
         scene: bodies.scene,
@@ -203,7 +203,12 @@ fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<(Content, Vec<Vertic
 fn shown(ix: usize, id: BodyId, name: String) -> Shown {
     let palette::BodyColors { colliding, other } = palette::body(ix);
     let colors = Colors { colliding, other };
-    Shown { id, name, colors }
+    Shown {
+        id,
+        name,
+        colors,
+        vertices: None,
+    }
 }
 
 /// The body that moves, and its frames.
