@@ -45,6 +45,27 @@ int main() {
   CHECK(detector.detect(scene).hash() == hash);
   scene.set_positions(body, wide.middleCols(3, 3).middleRows(2, VERTICES));
   CHECK(detector.detect(scene).hash() == hash);
+  // Vectors of a fixed size in a container, which are rows in memory, too.
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Array3i> corners;
+  for (Eigen::Index v = 0; v < second.rows(); ++v) points.push_back(second.row(v));
+  for (Eigen::Index f = 0; f < faces.rows(); ++f) corners.push_back(faces.row(f));
+  largest = 0;
+  scene.set_positions(body, points);
+  CHECK(largest < 1000 && detector.detect(scene).hash() == hash);
+  const std::vector<Eigen::RowVector3f> narrow(points.size(), Eigen::RowVector3f::Zero());
+  scene.set_positions(body, narrow);
+  CHECK(scene.positions(body).type == IMPINGE_F32);
+  const auto held = impinge::as_rows<Eigen::RowVector3f>(scene.positions(body));
+  CHECK(held.size() == points.size() && held[1] == narrow[1]);
+  scene.remesh(body, IMPINGE_TRIANGLES, corners, points);
+  CHECK(detector.detect(scene).hash() == hash);
+  try {
+    scene.set_positions(body, std::vector<Eigen::Vector4d>(VERTICES, Eigen::Vector4d::Zero()));
+    CHECK(!"it has thrown");
+  } catch (const impinge::error &error) {
+    CHECK(std::strstr(error.what(), "rows of 4 numbers given, 3 needed") != nullptr);
+  }
   // Packed rows go straight into the scene: no allocation at all is as large as the positions.
   largest = 0;
   scene.set_positions(body, second);

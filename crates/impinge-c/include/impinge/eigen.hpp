@@ -1,4 +1,5 @@
-/// impinge/eigen.hpp: matrices of Eigen as arrays of impinge, without a copy: row-major, column-major, blocks and `Eigen::Ref` of them, and maps.
+/// impinge/eigen.hpp: matrices of Eigen as arrays of impinge, without a copy: row-major, column-major, blocks and `Eigen::Ref` of them, maps, and
+/// containers of vectors of a fixed size.
 /// And answers of impinge as matrices.
 #ifndef IMPINGE_EIGEN_HPP
 #define IMPINGE_EIGEN_HPP
@@ -26,6 +27,16 @@ struct as_array<T, std::enable_if_t<std::is_base_of_v<Eigen::MatrixBase<T>, T> |
     return {matrix.data(), n, fits ? matrix.rowStride() * size : 1, fits ? matrix.colStride() * size : -static_cast<std::ptrdiff_t>(matrix.cols()), type};
   }
 };
+
+namespace detail {
+/// In containers, vectors of a fixed size are rows: `std::vector<Eigen::Vector3d>`.
+template <class T> struct row_of<T, std::enable_if_t<std::is_base_of_v<Eigen::PlainObjectBase<T>, T>>> {
+  static_assert(T::IsVectorAtCompileTime && T::SizeAtCompileTime != Eigen::Dynamic, "rows of Eigen are vectors of a fixed size");
+  using number = typename T::Scalar;
+  static constexpr std::size_t n = static_cast<std::size_t>(T::SizeAtCompileTime);
+  static_assert(sizeof(T) == n * sizeof(number), "rows are packed");
+};
+} // namespace detail
 
 /// The rows of pairs as a matrix of n x 4 unsigned numbers: body_a, element_a, body_b, element_b. A view.
 inline Eigen::Map<const Eigen::Matrix<std::uint32_t, Eigen::Dynamic, 4, Eigen::RowMajor>> as_matrix(view<pair> rows) {

@@ -233,7 +233,7 @@ template <class T, class = void> struct has_scalar : std::false_type {};
 template <class T> struct has_scalar<T, std::void_t<typename T::Scalar>> : std::true_type {};
 
 /// Numbers, each row after the other, or rows of `n` of them.
-template <class T> struct row_of {
+template <class T, class = void> struct row_of {
   using number = T;
   static constexpr std::size_t n = 0;
 };
@@ -248,6 +248,9 @@ template <class T, std::size_t N> struct row_of<T[N]> {
 template <class Row> array packed_rows(const void *data, std::size_t size, std::size_t columns) {
   constexpr auto n = row_of<Row>::n;
   using number = typename row_of<Row>::number;
+  static_assert(std::is_arithmetic_v<number>,
+                "no rows of numbers: containers are of numbers, std::array, or arrays of C; with impinge/eigen.hpp also of vectors of Eigen of a "
+                "fixed size; for structures give rows(&points[0].x, points.size(), sizeof points[0])");
   // A stride of one byte fits them.
   static_assert(n <= 1 || sizeof(number) > 1, "bytes are flags, one of each vertex, and no rows of several numbers");
   const bool fits = n > 0 ? n == columns : size % columns == 0;
@@ -259,7 +262,8 @@ template <class Row> array packed_rows(const void *data, std::size_t size, std::
 }
 } // namespace detail
 
-/// Containers with `data()` and `size()`: of numbers (each row after the other), or of `std::array`.
+/// Containers with `data()` and `size()`: of numbers (each row after the other), of `std::array`, or with impinge/eigen.hpp of `Eigen::Vector3d`
+/// and others of a fixed size.
 template <class T> struct as_array<T, std::enable_if_t<detail::is_container<T>::value && !detail::has_scalar<T>::value>> {
   static array of(const T &given, std::size_t columns) {
     return detail::packed_rows<std::remove_cv_t<typename T::value_type>>(given.data(), given.size(), columns);
