@@ -1,7 +1,11 @@
 //! Piles, in which each layer stops the next: rounds end, and where they do, the step is free.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use impinge_core::{
-    BodyId, Element, Method, PairKind, Positions, Query, Real, Scene, Start, Truncation,
+    Backend, BodyId, CancelToken, Control, Detector, Element, Error, Exclusion, Method, PairKind,
+    Positions, Query, Real, Scene, Settings, Start, Truncation,
 };
 use impinge_tests::detector;
 
@@ -202,4 +206,107 @@ fn checked_touching(scene: &Scene) -> Truncation {
     let free = detector(Method::Clusters, 1).is_free(&stopped(scene, &truncation), &query);
     assert!(free.expect("an answer"), "{truncation:?}");
     truncation
+}
+
+/// Bricks are as thick as their gaps allow, and pairs that do not meet do not stop each other in the
+/// last round, either: of pinned bricks, of groups, of vertices that are listed.
+#[test]
+fn what_is_thick_or_left_out_is_so_in_the_last_round() {
+    const N: usize = 330;
+    // This brick does not meet the one below it.
+    const APART: usize = 300;
+    let (scene, bodies) = pile(N, |x| x);
+    let mut thick = scene.clone();
+    for &body in &bodies {
+        thick.set_thickness(body, 0.25 * GAP).expect("good");
+    }
+    let keeping = checked(&thick, &Query::all());
+    assert_eq!((keeping.rounds(), keeping.n_touching()), (MOST_ROUNDS, 0));
+    for &body in &bodies[2..] {
+        let [least, most] = ways(&thick, &keeping, body);
+        assert!(least > 0.1 * GAP && most < GAP, "{least} {most}");
+    }
+    let two = [bodies[APART - 1], bodies[APART]];
+    let mut pinned = scene.clone();
+    let mut grouped = scene.clone();
+    for (ix, &body) in two.iter().enumerate() {
+        pinned.set_pinned(body, &[true; 6]).expect("good");
+        grouped.set_groups(body, &[1 + ix as u32; 6]).expect("good");
+    }
+    let every: Vec<u64> = (0..=6).map(|vertex| 6 * vertex).collect();
+    let listed = Exclusion::vertices(two[0], two[1], every, [0u32, 1, 2, 3, 4, 5].repeat(6));
+    let all = Query::all;
+    for (scene, query) in [
+        (&pinned, all()),
+        (&grouped, all().exclude(Exclusion::groups(1, 2))),
+        (&scene, all().exclude(listed)),
+        (&scene, all().exclude((two[0], two[1]))),
+    ] {
+        let truncation = checked(scene, &query);
+        assert_eq!(truncation.rounds(), MOST_ROUNDS);
+        for (layer, &body) in bodies.iter().enumerate().skip(2) {
+            let [least, most] = ways(scene, &truncation, body);
+            // Those above it sink with it: nothing is below them as far as they go.
+            let (low, high) = match layer < APART {
+                true => (0.2 * GAP, 2.0 * GAP),
+                false => (0.99 * SINK, 1.01 * SINK),
+            };
+            assert!(least > low && most < high, "{layer}: {least} {most}");
+        }
+        let named = truncation.pairs();
+        assert!(
+            named
+                .iter()
+                .all(|(_, a, b)| [a.body, b.body] != two && [b.body, a.body] != two)
+        );
+    }
+}
+
+/// With little memory, the last round looks at pairs in more runs; it stops when it is told to, and
+/// the next answer is whole.
+#[test]
+fn the_last_round_takes_budgets_and_cancellation() {
+    let (scene, _) = pile(300, |x| x);
+    let query = Query::all();
+    let expected = checked(&scene, &query);
+    let settings = || Settings::new().threads(2).backend(Backend::Cpu);
+    let budgeted = |bytes: u64| {
+        let mut detector = Detector::new(settings().memory_budget(bytes)).expect("settings");
+        detector.truncate(&scene, &query)
+    };
+    let fits = (10..40)
+        .map(|power| budgeted(1 << power))
+        .find(Result::is_ok);
+    assert_eq!(
+        fits.expect("enough in the end").expect("an answer"),
+        expected
+    );
+    let looks = |most: u32| {
+        let (token, n) = (CancelToken::new(), Arc::new(AtomicU32::new(0)));
+        let (canceller, count) = (token.clone(), Arc::clone(&n));
+        let mut detector = detector(Method::Clusters, 1);
+        detector.set_control(Control::new().cancel(&token).progress(move |_| {
+            if count.fetch_add(1, Ordering::Relaxed) + 1 == most {
+                canceller.cancel();
+            }
+        }));
+        let found = detector.truncate(&scene, &query);
+        detector.set_control(Control::new());
+        (found, detector, n.load(Ordering::Relaxed))
+    };
+    let (whole, _, n) = looks(u32::MAX);
+    assert_eq!(whole.expect("an answer"), expected);
+    // The looks of the last round are the last ones.
+    for before in [1, 2, 3, 5, 8] {
+        let (cancelled, mut detector, seen) = looks(n - before);
+        assert!(
+            matches!(cancelled, Err(Error::Cancelled)),
+            "{before} before the end"
+        );
+        assert!(seen < n);
+        assert_eq!(
+            detector.truncate(&scene, &query).expect("an answer"),
+            expected
+        );
+    }
 }
