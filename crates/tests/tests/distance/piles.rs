@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use impinge_core::{
-    Backend, BodyId, CancelToken, Control, Detector, Element, Error, Exclusion, Method, PairKind,
-    Positions, Query, Real, Scene, Settings, Start, Truncation,
+    Backend, BodyId, CancelToken, Control, Detector, Element, Error, Exclusion, Method, PairFilter,
+    PairKind, Positions, Query, Real, Scene, Settings, Start, Truncation,
 };
 use impinge_tests::detector;
 
@@ -235,8 +235,11 @@ fn what_is_thick_or_left_out_is_so_in_the_last_round() {
     }
     let every: Vec<u64> = (0..=6).map(|vertex| 6 * vertex).collect();
     let listed = Exclusion::vertices(two[0], two[1], every, [0u32, 1, 2, 3, 4, 5].repeat(6));
+    let filter = move |[(a, _), (b, _)]: [(BodyId, &[u32]); 2]| [a, b] != two && [b, a] != two;
     let all = Query::all;
     for (scene, query) in [
+        (&scene, all().filter(PairFilter::new(filter))),
+        (&scene, all().filter(PairFilter::new(filter).early())),
         (&pinned, all()),
         (&grouped, all().exclude(Exclusion::groups(1, 2))),
         (&scene, all().exclude(listed)),
