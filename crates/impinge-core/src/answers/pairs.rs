@@ -67,8 +67,8 @@ impl Pairs {
         self.keys.is_empty()
     }
 
-    /// Pairs from [rows](Pairs::rows), sorted, that this query finds in this scene: for callers that
-    /// keep rows alone.
+    /// Pairs from [rows](Pairs::rows), sorted, that this query finds in this scene: for callers
+    /// that keep rows alone.
     ///
     /// # Errors
     /// A row names a body or an element that is not there; rows are not sorted.
@@ -242,8 +242,8 @@ impl Pairs {
     /// by face or by vertex. `keep` is called once per pair, in order, after all pairs were found.
     /// So the answer is the same for every method, backend and thread count, provided that `keep`
     /// depends on the pair alone. The statistics do not change.
-    /// [`Detector::penetration`](crate::Detector::penetration) refuses contacts of two bodies without
-    /// some of their pairs.
+    /// [`Detector::penetration`](crate::Detector::penetration) refuses contacts of two bodies
+    /// without some of their pairs.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene};

@@ -159,8 +159,8 @@ impl SafeDistances {
     /// The pairs at distance 0, or at most as far apart as they are thick, whose vertices may not
     /// move at all. So are pairs nearer than the smallest `f64`, or farther than thick by no more
     /// than 2^-1045: ask [`Detector::any`](crate::Detector::any) what touches. Pairs of two
-    /// [fixed](crate::Query::fixed) bodies are among them, and unless the query names kinds, an edge
-    /// that pierces a face.
+    /// [fixed](crate::Query::fixed) bodies are among them, and unless the query names kinds, an
+    /// edge that pierces a face.
     pub fn touching(&self) -> &NearPairs {
         &self.touching
     }

@@ -39,8 +39,8 @@ pub struct Stencil {
     pub features: [Feature; 2],
     /// The vertices by their numbers in the scene: see [`Stencils::offsets`].
     pub vertices: [u32; 4],
-    /// How many pairs it stands for; or the [area](crate::NearPairs::stencils_by_area) at rest that they
-    /// stand for.
+    /// How many pairs it stands for; or the [area](crate::NearPairs::stencils_by_area) at rest that
+    /// they stand for.
     pub weight: f64,
     /// The positions of the vertices.
     pub points: [Point; 4],
@@ -280,8 +280,8 @@ impl Stencils {
     /// become one stencil of the vertex and the edge. Nearly parallel edges stay pairs of edges,
     /// since a mollifier belongs to each. These are the sets and weights of ipc-toolkit's
     /// `NormalCollisions` of type IPC; with weights by area, of
-    /// [those](crate::NearPairs::stencils_by_area). Where two types have the same distance, as for a
-    /// vertex exactly above an edge, ipc-toolkit may name the other.
+    /// [those](crate::NearPairs::stencils_by_area). Where two types have the same distance, as for
+    /// a vertex exactly above an edge, ipc-toolkit may name the other.
     ///
     /// # Errors
     /// There is no memory for them.

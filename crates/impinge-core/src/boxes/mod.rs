@@ -2,8 +2,10 @@
 //! `kernels/still.wgsl` and `kernels/moving.wgsl`.)
 //!
 //! ```text
-//! vertices of a pose  ->  box of some vertices   of_vertices, of_run, of_cluster; BoxSource::of_cluster: at both ends of a step
-//! corners in tables   ->  boxes of a group       LaneBounds::hold, fill; Sweep: what of a step they must hold
+//! vertices of a pose  ->  box of some vertices   of_vertices, of_run, of_cluster;
+//!                                                BoxSource::of_cluster: at both ends of a step
+//! corners in tables   ->  boxes of a group       LaneBounds::hold, fill;
+//!                                                Sweep: what of a step they must hold
 //! ```
 //!
 //! Boxes of positions in f32 are exact, those of positions in f64 rounded outward. Boxes of points

@@ -6,8 +6,8 @@
 //! name a common vertex. A frame then clears neighbours from its candidate masks with one `and`.
 //!
 //! ```text
-//! cluster A, lane 5                 own cluster      0b…0101_0000   lanes that share a vertex
-//!                     neighbour B > A, entry (5, mask)  0b…0000_0011   lanes of B that share a vertex
+//! cluster A, lane 5             own cluster      0b…0101_0000   lanes that share a vertex
+//!                 neighbour B > A, entry (5, mask)  0b…0000_0011   lanes of B that share a vertex
 //! ```
 //!
 //! A vertex with very many elements (the hub of a fan) would make these masks quadratic. Hubs are

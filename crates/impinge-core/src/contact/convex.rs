@@ -47,8 +47,8 @@ const ROUNDING: f64 = 1e-12;
 /// The shortest way that takes the convex hulls of two sets of points apart; `None` if these are
 /// flat in sum, so that their differences, as rounded, lie in one plane, or if one is empty.
 ///
-/// Its length is right to about 1e-12 of the size of both: bodies that are a 10^12th as thin as they
-/// are long are too thin for it.
+/// Its length is right to about 1e-12 of the size of both: bodies that are a 10^12th as thin as
+/// they are long are too thin for it.
 pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
     let origin = *b.first()?;
     let scale = Scale::of_points(a.iter().chain(b).map(|&point| sub(point, origin)));
@@ -153,7 +153,7 @@ fn rounded(normal: Point) -> [i64; 3] {
     normal.map(|x| (x * 1e9).round() as i64)
 }
 
-/// A tetrahedron of far differences that turns outwards; `None` if all differences lie in one plane.
+/// A tetrahedron of far differences that turns outwards; `None` if all lie in one plane.
 ///
 /// Between all differences from one point of a body, and all from one of the other, lies what is
 /// between any two differences. So if these are in one plane, then all are. They are looked at only

@@ -27,7 +27,7 @@
 //! let pairs = detector.detect(&scene, &Query::between(a, b))?.clone();
 //! let contacts = detector.contacts(&scene, &pairs)?;
 //! assert_eq!(contacts.shape(0), Shape::Segment);
-//! let ends: Vec<_> = contacts.corners(0).iter().map(|&point| contacts.points()[point as usize]).collect();
+//! let ends = [0, 1].map(|end| contacts.points()[contacts.corners(0)[end] as usize]);
 //! assert_eq!(ends, [[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]]);
 //! assert!((contacts.curves()?.length(0) - 0.5).abs() < 1e-15);
 //! # Ok(()) }

@@ -2,15 +2,15 @@
 //! nothing.
 //!
 //! A body is where its surface winds around points: where the winding number is not 0. A piece that
-//! the others do not wind around faces outwards if its signed volume is positive. One that they wind
-//! around is the wall of a cavity if it takes back their winding number: its space is empty. Else
-//! there is solid on both of its sides, so it bounds nothing. Pieces are taken not to cross. Where
-//! the others do not wind alike around all tried vertices of a piece, pieces cross; it then faces as
-//! its own signed volume says.
+//! the others do not wind around faces outwards if its signed volume is positive. One that they
+//! wind around is the wall of a cavity if it takes back their winding number: its space is empty.
+//! Else there is solid on both of its sides, so it bounds nothing. Pieces are taken not to cross.
+//! Where the others do not wind alike around all tried vertices of a piece, pieces cross; it then
+//! faces as its own signed volume says.
 //!
-//! Cost: a sum over all faces; a comparison for each two pieces whose boxes overlap along the longest
-//! axis of the body's box; where the box of a piece is within another's, also a ray for it, and 16
-//! more if the piece seems to bound nothing.
+//! Cost: a sum over all faces; a comparison for each two pieces whose boxes overlap along the
+//! longest axis of the body's box; where the box of a piece is within another's, also a ray for it,
+//! and 16 more if the piece seems to bound nothing.
 
 use super::inside::{ByY, passes};
 use super::topology::EdgesAround;

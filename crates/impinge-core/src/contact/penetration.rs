@@ -668,8 +668,8 @@ impl OverlapWork<'_> {
 }
 
 /// The volume of each region: a sixth of the sum of `(x - o) · ((p - o) × (q - o))` over the sides
-/// pq of the parts of faces that lie inside, where x is any point of the face and o is one point for
-/// all. Coordinates are scaled, with one power of two per region.
+/// pq of the parts of faces that lie inside, where x is any point of the face and o is one point
+/// for all. Coordinates are scaled, with one power of two per region.
 struct VolumeSums {
     origins: Vec<(Scale, Point)>,
     sums: Vec<f64>,

@@ -49,8 +49,9 @@ pub struct Region {
     /// Vertices of the first body inside the second, and of the second inside the first; sorted.
     /// Empty unless [`Penetration`](super::Penetration) found the region.
     pub inside: [Vec<u32>; 2],
-    /// The extent of the region along the normal. Bodies that are pushed that far may still overlap.
-    /// `None` without a normal, or unless [`Penetration`](super::Penetration) found the region.
+    /// The extent of the region along the normal. Bodies that are pushed that far may still
+    /// overlap. `None` without a normal, or unless [`Penetration`](super::Penetration) found the
+    /// region.
     pub depth: Option<f64>,
     /// The volume that the bodies have in common, in cubic units. A cavity that no edge joins to
     /// its surroundings is a region of negative volume. `None` unless

@@ -1,10 +1,10 @@
 //! The method `Cells` on the CPU: the paper's two levels.
 //!
 //! ```text
-//! bounds      box of each body; where bodies overlap; elements that reach there and have elements of
-//!             another body near them, and their boxes
+//! bounds      box of each body; where bodies overlap; elements that reach there and have elements
+//!             of another body near them, and their boxes
 //! grid        eq. (1) resolution, eq. (3) ranges; count, prefix sum, scatter into cell lists
-//! traversal    cells with elements of bodies that meet; lists cut into groups of at most 64;
+//! traversal   cells with elements of bodies that meet; lists cut into groups of at most 64;
 //!             Cartesian product of groups, eq. (4): work items
 //! pairing     4x4x4 sub-cells, axis by axis; owner rule; boxes
 //! narrow      filters, then exact arithmetic

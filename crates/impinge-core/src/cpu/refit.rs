@@ -2,8 +2,8 @@
 //! them.
 //!
 //! ```text
-//! read    all boxes of a body whose clusters are not sorted; else its positions in memory order, and the boxes of
-//!         clusters in no group
+//! read    all boxes of a body whose clusters are not sorted; else its positions in memory order,
+//!         and the boxes of clusters in no group
 //! prove   whether its groups are beside all bodies that it could meet (see `culled`)
 //! back    if not, also the boxes of clusters that have come back
 //! above   nodes; bodies that have flowed away from their clusters are clustered again

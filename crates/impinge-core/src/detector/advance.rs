@@ -32,8 +32,8 @@ impl Detector {
     /// than twice what is needed.
     ///
     /// On the CPU all pairs are searched once, and rounded positions are tested on the pairs that
-    /// rounding may bring together. On a GPU, with a separation, a thickness or a memory budget, and
-    /// where too many pairs are that close, all pairs are searched again for rounded positions.
+    /// rounding may bring together. On a GPU, with a separation, a thickness or a memory budget,
+    /// and where too many pairs are that close, all pairs are searched again for rounded positions.
     ///
     /// With a [clearance](Query::clearance), every pair keeps what that says, and what floats can
     /// round besides. So the fraction holds for solvers too, which compute positions themselves: as

@@ -2,9 +2,9 @@
 //! elements are near each element.
 //!
 //! ```text
-//! near pairs (keys)  ->  Measured    a number below the distance of each pair, eight pairs at a time, in parallel
-//! SafeDistances                      of each vertex, the least share of these
-//! Neighbours                         the pairs by element
+//! near pairs (keys)  ->  Measured   a number below the distance of each pair, in parallel
+//! SafeDistances                     of each vertex, the least share of these
+//! Neighbours                        the pairs by element
 //! ```
 //!
 //! For safe distances, pairs whose bounds show that they give no vertex less are dropped where they
@@ -71,9 +71,11 @@ impl Detector {
     /// use impinge::{Backend, Bounds, Detector, Query, Scene};
     /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
-    /// let floor = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])?;
+    /// let corners = [[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    /// let floor = scene.add_triangles(&[[0, 1, 2]], &corners)?;
     /// let points = scene.add_points(&[[1.0f32, 1.0, 0.5], [1.0, 1.0, 9.0]])?;
-    /// let safe = Detector::new(Backend::Cpu)?.safe_distances(&scene, 1.0, &Query::all().fixed([floor]))?;
+    /// let query = Query::all().fixed([floor]);
+    /// let safe = Detector::new(Backend::Cpu)?.safe_distances(&scene, 1.0, &query)?;
     /// let bounds = safe.of(points).expect("a body");
     /// assert!(bounds.get(0) < 0.5 && bounds.get(0) > 0.4999);
     /// assert_eq!(bounds.get(1), 1.0);
@@ -173,8 +175,8 @@ struct Measured<'a> {
 }
 
 impl SolverMemory {
-    /// Measures the distance of each pair, in parallel, and takes the labels off keys. `each` is told
-    /// of each pair, and says which key it then has.
+    /// Measures the distance of each pair, in parallel, and takes the labels off keys. `each` is
+    /// told of each pair, and says which key it then has.
     ///
     /// # Errors
     /// There is no memory, cancellation.

@@ -59,8 +59,8 @@ impl Detector {
     /// bodies, there is a round for each. After 255 rounds, those that may still meet, directly or
     /// through others, get planes that rest, for all of their pairs: that is the last round, and
     /// takes them no farther than to what was next to them at the start. A body whose end a
-    /// [transform](Scene::set_end_transform) made stops as a whole: all of its vertices go the least
-    /// share of their ways that one of them may go.
+    /// [transform](Scene::set_end_transform) made stops as a whole: all of its vertices go the
+    /// least share of their ways that one of them may go.
     ///
     /// The vertices of pairs that touch at the start, or are at most as far apart as they are to
     /// keep, stay where they are, and [are counted](Truncation::n_touching); under

@@ -1,8 +1,9 @@
 //! Stage `collect`: counters and results come back in one copy.
 //!
 //! ```text
-//! counters | grid | pairs, a quarter more than last time | unsure pairs, likewise                         | times of the stages
-//!                                           in a step:  unsure pairs, likewise | their times, unless any contact will do
+//! counters | grid | pairs: a quarter more than last time | unsure pairs: likewise | stages' times
+//!
+//! in a step, in place of both:  unsure pairs: likewise | their times, unless any contact will do
 //! ```
 //!
 //! If there are more than were copied, the rest follows in a second copy; no kernel runs again.

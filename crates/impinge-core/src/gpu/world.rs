@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! parts       edges of all bodies | vertices | faces | elements as given that are none of these
-//! positions   all bodies at the start | all bodies at the end          without the end if no step was asked for
+//! positions   all bodies at the start | all bodies at the end      no end if no step was asked for
 //! nodes       boxes at the start      | boxes at the end
 //! ```
 //!
@@ -278,8 +278,8 @@ impl DeviceWorld {
         }
     }
 
-    /// Says by how much boxes are to be widened, the bits of an f32. Views share nodes, so those that
-    /// another question has widened otherwise fit none of them.
+    /// Says by how much boxes are to be widened, the bits of an f32. Views share nodes, so those
+    /// that another question has widened otherwise fit none of them.
     pub(super) fn widen(&mut self, reach: u32) {
         if self.reach != reach {
             self.is_moved();
@@ -594,7 +594,7 @@ impl DeviceWorld {
         }
     }
 
-    /// The bodies whose positions are on the device, in their order, and how many vertices each has.
+    /// Bodies whose positions are on the device, in their order, and how many vertices each has.
     pub fn bodies(&self) -> impl Iterator<Item = (BodyId, u64)> {
         self.bodies.iter().map(|body| (body.id, body.n_vertices))
     }
@@ -679,8 +679,8 @@ fn key(part: &HeldPart) -> (BodyId, *const Clustering) {
 /// A part of what is sent, for one of the threads.
 struct Sent<'a>(wgpu::WriteOnly<'a, [u8]>);
 
-// SAFETY: a `WriteOnly<T>` is `Send` where `T` is, but wgpu says so of sized types alone. It is like a
-// mutable reference, and bytes may be sent.
+// SAFETY: a `WriteOnly<T>` is `Send` where `T` is, but wgpu says so of sized types alone. It is
+// like a mutable reference, and bytes may be sent.
 unsafe impl Send for Sent<'_> {}
 
 /// Writes the positions of consecutive bodies as the device has them, on all threads.

@@ -1,10 +1,13 @@
 //! How near elements may come, and how far boxes must reach so that those of near elements overlap.
 //!
 //! ```text
-//! distance      what is asked: of a query for near pairs, the separation of a step, or twice the inflation of candidates
-//! thickness     what a body adds to it, or each of its elements
-//! bound         what any pair of a step keeps at most, besides its thickness: the separation, and a clearance
-//! inflation     how far the boxes of a part reach beyond its elements: its thickness, and half of the bound
+//! distance    what is asked: of a query for near pairs, the separation of a step, or twice the
+//!             inflation of candidates
+//! thickness   what a body adds to it, or each of its elements
+//! bound       what any pair of a step keeps at most, besides its thickness: the separation, and a
+//!             clearance
+//! inflation   how far the boxes of a part reach beyond its elements: its thickness, and half of
+//!             the bound
 //! ```
 
 use std::collections::BTreeMap;
@@ -116,7 +119,7 @@ impl Plan {
         self.keep_of(elements).distance(pair, ends, unit)
     }
 
-    /// When two elements are first as near as they may come: a bound of that, if no times are asked.
+    /// When two elements are first as near as they may come: a bound, if no times are asked.
     pub(crate) fn first(
         &self,
         scene: &Scene,

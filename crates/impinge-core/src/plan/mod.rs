@@ -326,7 +326,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The question which boxes overlap, each inflated by a distance and the thickness of its element.
+    /// Which boxes overlap, each inflated by a distance and the thickness of its element.
     pub(crate) fn candidates(
         scene: &Scene,
         inflation: f64,
@@ -590,8 +590,8 @@ impl Plan {
         found.ok().map(PartIx::from_usize)
     }
 
-    /// The parts, in order, of which every wanted pair of two bodies has one, if they are at most so
-    /// many: those with one filter, where no others meet.
+    /// The parts, in order, of which every wanted pair of two bodies has one, if they are at most
+    /// so many: those with one filter, where no others meet.
     pub(crate) fn named_parts(&self, most: usize) -> Option<Vec<PartIx>> {
         // Scenes with more filters than this are not looked at.
         const MOST_FILTERS: usize = 8;

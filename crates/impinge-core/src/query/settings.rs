@@ -151,8 +151,8 @@ pub struct Settings {
     pub max_pairs: Option<u64>,
     /// `Clusters`: whether bodies are clustered again.
     pub recluster: Recluster,
-    /// A distance in the unit of the scene, for solvers that ask again and again while little moves.
-    /// If it is above 0, [`near`](crate::Detector::near),
+    /// A distance in the unit of the scene, for solvers that ask again and again while little
+    /// moves. If it is above 0, [`near`](crate::Detector::near),
     /// [`neighbours`](crate::Detector::neighbours) and
     /// [`safe_distances`](crate::Detector::safe_distances) list the pairs within their distance and
     /// this margin, and look at no others until some vertex has moved farther than half of it from
@@ -162,8 +162,8 @@ pub struct Settings {
     /// To make a list takes up to twice as long as to answer without one, and a question that it
     /// serves half to nine tenths of that: it pays from the third or so. After a list that served
     /// none, the next is made when vertices have moved at most half of the margin between two
-    /// questions. With a larger margin it holds longer and has more pairs; an eighth of the distance
-    /// is a good start.
+    /// questions. With a larger margin it holds longer and has more pairs; an eighth of the
+    /// distance is a good start.
     pub reuse_margin: f64,
     /// GPU: part of an adapter's name, to choose among several.
     pub device: Option<String>,

@@ -21,7 +21,8 @@ struct Slot(Option<(BodyId, Body)>);
 /// use impinge::Scene;
 /// # fn main() -> Result<(), impinge::Error> {
 /// let mut scene = Scene::new();
-/// let a = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
+/// let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let a = scene.add_triangles(&[[0, 1, 2]], &corners)?;
 /// scene.set_positions(a, &[[0.0f32, 0.0, 0.1], [1.0, 0.0, 0.1], [0.0, 1.0, 0.1]])?;
 /// # Ok(()) }
 /// ```
@@ -210,9 +211,9 @@ impl Scene {
         Ok(())
     }
 
-    /// Sets which other bodies a body meets in [`Query::all`](crate::Query::all), the default, and in
-    /// [`Query::between_all`](crate::Query::between_all). Self-collision does not depend on it, nor do
-    /// queries that name their bodies.
+    /// Sets which other bodies a body meets in [`Query::all`](crate::Query::all), the default, and
+    /// in [`Query::between_all`](crate::Query::between_all). Self-collision does not depend on it,
+    /// nor do queries that name their bodies.
     ///
     /// # Errors
     /// The id names no body.

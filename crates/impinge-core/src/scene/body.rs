@@ -194,8 +194,8 @@ impl Body {
     }
 
     /// The positions from which [transforms](crate::Scene::set_transform) start: those that were
-    /// given last, or reached by the last step that was [taken](crate::Advance::apply). A step whose
-    /// end a [transform](crate::Scene::set_end_transform) set leaves them as they are.
+    /// given last, or reached by the last step that was [taken](crate::Advance::apply). A step
+    /// whose end a [transform](crate::Scene::set_end_transform) set leaves them as they are.
     pub fn rest_positions(&self) -> &Positions {
         match &self.motion {
             Some(motion) => &motion.rest,

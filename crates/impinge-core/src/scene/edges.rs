@@ -22,7 +22,8 @@ impl Scene {
     /// use impinge::{Backend, Detector, Elements, PairKind, Query, Scene};
     /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
-    /// let face = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
+    /// let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let face = scene.add_triangles(&[[0, 1, 2]], &corners)?;
     /// scene.add_edges(&[[0, 1]], &[[0.5f32, -0.5, 0.25], [0.5, 0.25, 0.25]])?;
     /// scene.set_edges(face, &[[2, 1], [2, 0], [0, 1]])?;
     /// assert_eq!(*scene.body(face)?.edges(), Elements::from(vec![[2, 1], [2, 0], [0, 1]]));

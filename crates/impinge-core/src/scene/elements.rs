@@ -83,8 +83,8 @@ impl Elements {
         with_corners!(self, |corners| &corners[element])
     }
 
-    /// The same of an element of a part, whose elements these are; vertices are numbered as positions
-    /// are.
+    /// The same of an element of a part, whose elements these are; vertices are numbered as
+    /// positions are.
     #[inline(always)]
     pub(crate) fn corners_in<'a>(&'a self, part: Part, element: &'a ElementIx) -> &'a [u32] {
         match part {

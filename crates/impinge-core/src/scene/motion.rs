@@ -20,20 +20,22 @@ impl Scene {
     /// `Positions` are taken over, and an `Arc` of something that has rows is shared, without a
     /// copy: the body drops it when it gets other positions or is removed. Two shared arrays serve
     /// a simulation: write the one that the scene has dropped, give it, and go on with the other.
-    /// What is copied is checked now, and so are up to 32,768 positions that are not. More of them are
-    /// read once, by the next question, whose error names a bad vertex.
+    /// What is copied is checked now, and so are up to 32,768 positions that are not. More of them
+    /// are read once, by the next question, whose error names a bad vertex.
     ///
     /// ```
     /// use std::sync::Arc;
     /// use impinge::Scene;
     /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
-    /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
+    /// let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let body = scene.add_triangles(&[[0, 1, 2]], &corners)?;
     /// let mut frames = [vec![[0.0f32; 3]; 3], vec![[0.0f32; 3]; 3]].map(Arc::new);
     /// for step in 0..10u8 {
-    ///     let next = Arc::get_mut(&mut frames[usize::from(step % 2)]).expect("dropped by the scene");
+    ///     let frame = &mut frames[usize::from(step % 2)];
+    ///     let next = Arc::get_mut(frame).expect("dropped by the scene");
     ///     next[1] = [1.0, 0.0, step.into()];
-    ///     scene.set_positions(body, Arc::clone(&frames[usize::from(step % 2)]))?;
+    ///     scene.set_positions(body, Arc::clone(frame))?;
     /// }
     /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 9.0]);
     /// # Ok(()) }
@@ -86,8 +88,8 @@ impl Scene {
         Ok(())
     }
 
-    /// Refuses positions of a body that were written in place, or taken over, and are not finite, as
-    /// questions about it do.
+    /// Refuses positions of a body that were written in place, or taken over, and are not finite,
+    /// as questions about it do.
     ///
     /// # Errors
     /// The id names no body; positions that are refused.
@@ -143,8 +145,10 @@ impl Scene {
     /// use impinge::{Positions, Scene};
     /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
-    /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
-    /// let up = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.5], [0.0, 0.0, 0.0, 1.0]];
+    /// let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let body = scene.add_triangles(&[[0, 1, 2]], &corners)?;
+    /// let [x, y] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]];
+    /// let up = [x, y, [0.0, 0.0, 1.0, 0.5], [0.0, 0.0, 0.0, 1.0]];
     /// scene.set_transform(body, &up)?;
     /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 0.5]);
     /// assert_eq!(scene.body(body)?.rest_positions().point(1), [1.0, 0.0, 0.0]);
@@ -203,10 +207,12 @@ impl Scene {
     /// use impinge::Scene;
     /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
-    /// let blade = scene.add_triangles(&[[0, 1, 2]], &[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 0.1]])?;
+    /// let corners = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 0.1]];
+    /// let blade = scene.add_triangles(&[[0, 1, 2]], &corners)?;
     /// let turned = |angle: f64| {
     ///     let (sin, cos) = angle.sin_cos();
-    ///     [[cos, -sin, 0.0, 0.0], [sin, cos, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    ///     let [x, y] = [[cos, -sin, 0.0, 0.0], [sin, cos, 0.0, 0.0]];
+    ///     [x, y, [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
     /// };
     /// // A half turn, of which no step may leave the arc by more than 0.01.
     /// let (angle, radius, deviation) = (std::f64::consts::PI, 2.0, 0.01);

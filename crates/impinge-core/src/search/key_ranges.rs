@@ -8,7 +8,7 @@
 //!
 //! ```text
 //! ranges   |     vertices and faces    |        edges and edges        |
-//! parts    |   |   |   |   |   |   |   |   |   |   |   |   |   |   |   |   powers of two, as wide as needed
+//! parts    |   |   |   |   |   |   |   |   |   |   |   |   |   |   |   |   powers of two
 //! counts     0   7   2   0   4   1   9   3   0   8   8   0   2   5   1     of at most 10 per run:
 //! runs     |------ 1 -----|--- 2 --|------ 3 --|-- 4 --|------ 5 ------|
 //! ```

@@ -1,7 +1,7 @@
 //! The elements and points of one pair after another, by their keys.
 //!
-//! Reason: answers have millions of pairs, nearly all of the same two parts. What is known of a part
-//! is held from pair to pair; to look it up for each costs more than to read the points.
+//! Reason: answers have millions of pairs, nearly all of the same two parts. What is known of a
+//! part is held from pair to pair; to look it up for each costs more than to read the points.
 
 use crate::plan::Plan;
 use crate::scene::Scene;

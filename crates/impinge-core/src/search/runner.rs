@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! scene + query  ->  Plan      what is asked: one constructor per question
-//! Plan           ->  Finder    a backend, a method of another crate, or the oracle; its pairs go to an `Answer`
+//! Plan           ->  Finder    a backend, a method of another crate, or the oracle; its pairs go
+//!                              to an `Answer`
 //! Answer         ->  Outcome   pairs, impacts, candidates, near pairs: sorted, with statistics
 //! ```
 //!

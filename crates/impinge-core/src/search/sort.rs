@@ -5,7 +5,7 @@
 //! runs are sorted:
 //!
 //! ```text
-//! keys       | 5 9 | 2 7 | 5 6 | 2 3 |   as they were found; each thread counts and places a part of them
+//! keys       | 5 9 | 2 7 | 5 6 | 2 3 |   as they were found; each thread counts and places a part
 //! partners   | 7 3 | 9 6 |               of 2, of 5
 //! keys       | 2 3 | 2 7 | 5 6 | 5 9 |   each run sorted, and written back
 //! ```

@@ -7,7 +7,7 @@
 //!
 //! ```text
 //! caller    | call | region 1 ......... | alone | region 2 .... | end of the shift
-//! helper    : (waking) ..........|      | spins | ............. | lingers, as long as the shift took | sleeps
+//! helper    : (waking) ..........|      | spins | ............. | lingers for as long | sleeps
 //! ```
 //!
 //! A helper that lingers yields to every other thread. Clustering, which rayon parallelises, runs

@@ -35,8 +35,8 @@ impl Integer {
         if self.is_zero() {
             return 0.0;
         }
-        // |self| / divisor lies in [2^(e-1), 2^(e+1)), so with this quantum the quotient has at most
-        // one bit too many, and never too few.
+        // |self| / divisor lies in [2^(e-1), 2^(e+1)), so with this quantum the quotient has at
+        // most one bit too many, and never too few.
         let bits = |number: &Integer| number.n_bits().cast_signed();
         let mut quantum = (bits(self) - bits(divisor) + unit - i64::from(precision)).max(lowest);
         let (mut whole, mut rest, mut scaled) = self.divided(divisor, quantum - unit);

@@ -215,9 +215,8 @@ fn excess_over(
 }
 
 /// A number below what the distance of two elements is beyond the exact sum of two numbers, by at
-/// most 2^-23 of it, or by 2^-1045; 0 if and only if they are within that sum, or farther by at most
-/// 2^-1045.
-/// The excess should be between two numbers, and is if the first one is above 0.
+/// most 2^-23 of it, or by 2^-1045; 0 if and only if they are within that sum, or farther by at
+/// most 2^-1045. The excess should be between two numbers, and is if the first one is above 0.
 pub(super) fn below_excess(
     sum: [f64; 2],
     pair: (ElementPair, &[Point; 4]),

@@ -208,9 +208,9 @@ impl<T: Number> Polygon<T> {
     /// are enough:
     ///
     /// ```text
-    /// face      every w_i > 0                                  the origin is above or below the inside
-    /// edge i    w_i < 0, V_i . E_i < 0 < V_{i+1} . E_i         beyond the edge, and between its ends
-    /// corner i  V_i . E_i > 0 > V_i . E_{i-1}, N != 0          both edges lead away from the origin
+    /// face      every w_i > 0                            the origin is above or below the inside
+    /// edge i    w_i < 0, V_i . E_i < 0 < V_{i+1} . E_i   beyond the edge, and between its ends
+    /// corner i  V_i . E_i > 0 > V_i . E_{i-1}, N != 0    both edges lead away from the origin
     /// ```
     ///
     /// V . E is wrong by less than 16 u |V| |E|, a coordinate of N by less than 9 u |E_0| |E_1|,

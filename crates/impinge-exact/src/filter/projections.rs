@@ -6,10 +6,10 @@
 //! of an edge.
 //!
 //! ```text
-//!    a2            b2       Triangles that are apart in the projection are apart in space. Of the three
-//!    | \         / |        projections, one shows a triangle at more than half of its area.
-//!    |  \  |    /  |
-//!    a0--a1|   b0--b1       all of b beyond the line of edge a1a2: apart
+//! a2            b2      Triangles that are apart in the projection are apart in space. Of the
+//! | \         / |       three projections, one shows a triangle at more than half of its area.
+//! |  \  |    /  |
+//! a0--a1|   b0--b1      all of b beyond the line of edge a1a2: apart
 //! ```
 //!
 //! Every value here is a determinant of two differences of input points, wrong by less than 8.1 u

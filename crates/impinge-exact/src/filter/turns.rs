@@ -8,8 +8,11 @@
 //!
 //! ```text
 //! bit  14 13 12 | 11 10 9 | 8 7 6 | 5 4 | 3 2 | 1 0
-//!      crosses    crosses   crosses  z     y     x     x, y, z: certainly turns to the left (lower bit), to the right
-//!      at 2       at 1      at 0                       crosses: along x (lowest bit), y, z
+//!      crosses    crosses   crosses  z     y     x
+//!      at 2       at 1      at 0
+//!
+//! x, y, z: certainly turns to the left (lower bit), to the right
+//! crosses: along x (lowest bit), y, z
 //! ```
 //!
 //! Seen from a corner along an axis, each of the other two corners is below the line through that

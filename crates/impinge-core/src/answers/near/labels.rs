@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   63          32 31           4 3    0
-//! | lower number | higher number | part |     part: `impinge_exact::filter::Near16`; 15 where it is not known
+//! | lower number | higher number | part |     part: `impinge_exact::filter::Near16`; 15: not known
 //! ```
 //!
 //! The order is that of the keys. Where numbers need more than 28 bits, no part is carried.

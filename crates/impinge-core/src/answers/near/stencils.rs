@@ -20,9 +20,9 @@ use impinge_exact::Point;
 use impinge_exact::internal::NearestOfElements;
 
 impl NearPairs {
-    /// A [`Stencil`](crate::Stencil) per pair, in the same order, at the positions that the scene has now: with
-    /// distances, gradients and Hessians for a potential. Features are those that were nearest when
-    /// the pairs were found.
+    /// A [`Stencil`](crate::Stencil) per pair, in the same order, at the positions that the scene
+    /// has now: with distances, gradients and Hessians for a potential. Features are those that
+    /// were nearest when the pairs were found.
     ///
     /// A potential of contact sums over [`Stencils::merged`] in place of pairs. Positions at
     /// `rest`, in the order of the stencils' [numbers](Stencils::offsets), switch on the mollifier

@@ -15,7 +15,8 @@ use super::{Gradient, Hessian, Point, cross, dot, sub};
 use crate::scene::vector::scaled;
 use impinge_exact::internal::power_of_two;
 
-/// What the squared length of the cross product is compared with; 0 by default, which none is below.
+/// What the squared length of the cross product is compared with; 0 by default, which none is
+/// below.
 ///
 /// Packed for the sake of stencils, of which there are many.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

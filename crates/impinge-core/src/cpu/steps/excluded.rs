@@ -2,15 +2,15 @@
 //! those that the query leaves out by lists of vertices or by name.
 //!
 //! ```text
-//!   cluster a -> [cluster b, rows, ..]     clusters with a pair that is excluded
-//!                            |
-//!                  row -> lanes of b       bits that pairing takes away from those whose boxes meet
+//! cluster a -> [cluster b, rows, ..]     clusters with a pair that is excluded
+//!                          |
+//!                row -> lanes of b       bits that pairing takes away from those whose boxes meet
 //! ```
 //!
 //! Most elements near an element are its neighbours in the surface, so most boxes that meet are of
-//! pairs that are excluded. They depend on topology and query alone: found once, each costs a bit in
-//! place of a comparison of all corners. Bodies with hubs have none: all pairs of a fan share its
-//! middle, and pairing compares the corners of candidates.
+//! pairs that are excluded. They depend on topology and query alone: found once, each costs a bit
+//! in place of a comparison of all corners. Bodies with hubs have none: all pairs of a fan share
+//! its middle, and pairing compares the corners of candidates.
 //!
 //! Cost: `O(n)` for each pair of parts, once per topology and query; some 50 bytes per element of a
 //! surface without two rings.
@@ -348,8 +348,8 @@ impl SlotsOfVertices {
     }
 }
 
-/// The pairs of two parts that are left out by name, sorted: the first slot in the upper half. Those
-/// of one cluster are there both ways.
+/// The pairs of two parts that are left out by name, sorted: the first slot in the upper half.
+/// Those of one cluster are there both ways.
 fn named(
     plan: &Plan,
     [a, b]: [PartIx; 2],

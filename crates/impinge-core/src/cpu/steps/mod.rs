@@ -4,8 +4,9 @@
 //! ```text
 //! clustering  the vertices, edges and faces of each body, once per topology
 //! bounds      two boxes per cluster, at the start and at the end; the tree above holds both
-//! excluded    of each body, the pairs that share a vertex or are left out, once per topology and query
-//! traversal    parts whose boxes meet, then tree against tree: as for intersections
+//! excluded    of each body, the pairs that share a vertex or are left out, once per topology and
+//!             query
+//! traversal   parts whose boxes meet, then tree against tree: as for intersections
 //! pairing     boxes of elements at both ends; candidates per work item
 //! narrow      filters, then exact arithmetic
 //! ```

@@ -266,7 +266,7 @@ fn pair<S: Simd>(
         false => None,
     };
     let excluded = known.and_then(|known| known.of(item.cluster_a, item.cluster_b));
-    // The lanes of the side with fewer of them are the rows; excluded pairs are known by lanes of A.
+    // The lanes of the side with fewer are the rows; excluded pairs are known by lanes of A.
     let is_by_a = excluded.is_some() || lanes_a.count_ones() <= lanes_b.count_ones();
     let (side, rows, lanes, groups) = match is_by_a {
         true => (RowSide::A, lanes_a, lanes_b, [a, b]),

@@ -1,8 +1,10 @@
 //! Near pairs again, from a list of those that were near with a margin: a Verlet list.
 //!
 //! ```text
-//! listing   all stages, within distance + margin; candidates that may be so near are kept, as lanes of clusters
-//! narrow    the listed ones alone, within the distance: as long as no vertex has moved farther than margin / 2
+//! listing   all stages, within distance + margin; candidates that may be so near are kept, as
+//!           lanes of clusters
+//! narrow    the listed ones alone, within the distance: as long as no vertex has moved farther
+//!           than margin / 2
 //! ```
 //!
 //! Reason: two points come nearer by at most what both move. So a pair that is within the distance

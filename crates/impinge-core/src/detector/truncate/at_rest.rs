@@ -8,11 +8,11 @@
 //!
 //! Planes at rest part two elements wherever their vertices stop, so no pair needs to be looked at
 //! again: a vertex that is taken back stays on its side, and what had no box in common has none
-//! later. They stop more than they must, as where a sheet flies within its own plane. So only groups
-//! in which a pair still meets get them; all other vertices are not taken back.
+//! later. They stop more than they must, as where a sheet flies within its own plane. So only
+//! groups in which a pair still meets get them; all other vertices are not taken back.
 //!
-//! Cost: two searches for overlapping boxes, one for the groups and one for those that meet. Memory:
-//! a run of pairs, a number per vertex, and the pairs that stop vertices.
+//! Cost: two searches for overlapping boxes, one for the groups and one for those that meet.
+//! Memory: a run of pairs, a number per vertex, and the pairs that stop vertices.
 //!
 //! Source: "Divide and Truncate" has planes for all pairs, in its only round.
 
@@ -168,7 +168,7 @@ impl Groups {
             if parent == vertex {
                 return vertex;
             }
-            // Shortens the way for the next one; what is lost to other threads is no more than that.
+            // Shortens the way for the next one; no more than that is lost to other threads.
             let next = self.parents[parent].load(Ordering::Relaxed);
             self.parents[vertex].store(next, Ordering::Relaxed);
             vertex = next;

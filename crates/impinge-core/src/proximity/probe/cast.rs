@@ -481,7 +481,7 @@ impl RaySearch<'_> {
         }
     }
 
-    /// What is said of the rays that are not answered yet: nothing, the first hits, or all in order.
+    /// What is said of rays that are not answered yet: nothing, the first hits, or all in order.
     ///
     /// # Errors
     /// Cancellation.

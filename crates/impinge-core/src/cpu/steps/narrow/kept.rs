@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! tables    sixteen pairs at a time in f32: certainly near at the start, or apart until the end
-//! approach  one pair at a time in f64: what the pair keeps, and when it is that near, nearly always to all bits of an f32
+//! approach  one pair at a time in f64: what the pair keeps, and when it is that near, nearly
+//!           always to all bits of an f32
 //! ```
 //!
 //! Reason for each discard: no pair of two parts keeps more than `Plan::most_kept`.

@@ -1,9 +1,9 @@
 //! Candidates that may come within a distance while no vertex moves far, for a
 //! [`VerletList`](super::super::verlet::VerletList).
 //!
-//! In: candidates within the distance and a margin. Dropped: vertices and faces, and edges, that the
-//! filter of `near` tells farther apart than both together; an edge and a face, which are only ever
-//! asked whether they meet, where the margin alone parts their boxes.
+//! In: candidates within the distance and a margin. Dropped: vertices and faces, and edges, that
+//! the filter of `near` tells farther apart than both together; an edge and a face, which are only
+//! ever asked whether they meet, where the margin alone parts their boxes.
 
 use crate::cpu::lane_pairs::WorkItem;
 use crate::query::pair_kind::PairKind;

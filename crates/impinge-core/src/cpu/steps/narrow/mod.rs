@@ -5,7 +5,8 @@
 //! the oracle decides pairs one by one:
 //!
 //! ```text
-//! touching   FirstContact: whether two elements touch during the step, and when first (search: the times)
+//! touching   FirstContact: whether two elements touch during the step, and when first (search: the
+//!            times)
 //! kept       the same where elements keep a separation, or each pair a clearance of its own
 //! overlaps   BoxOverlap: whether the boxes over the whole step overlap
 //! near       Within: whether two elements are within a distance at the start

@@ -243,8 +243,8 @@ struct PartPair<'a> {
 }
 
 impl PartPair<'_> {
-    /// The elements of a candidate, by the numbers that its groups hold: with `batch::located`, which
-    /// looks them up by slot, such questions take 5 % longer.
+    /// The elements of a candidate, by the numbers that its groups hold: with `batch::located`,
+    /// which looks them up by slot, such questions take 5 % longer.
     #[inline(always)]
     fn located(&self, batch: &Batch<'_>, ix: usize) -> [(PartIx, ElementIx); 2] {
         let [a, b] = numbers_in(batch.groups, batch.lane_pairs.lanes(ix));

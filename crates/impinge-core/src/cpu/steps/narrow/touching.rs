@@ -4,7 +4,8 @@
 //! (`impinge_exact::filter`):
 //!
 //! ```text
-//! far     sixteen pairs at a time in f32, from the tables of the two groups: apart along a few directions
+//! far     sixteen pairs at a time in f32, from the tables of the two groups: apart along a few
+//!         directions
 //! across  those that are left, put side by side: apart along their normals, or never in one plane
 //! aside   those that are left: one element always stays beside the other
 //!         (if positions are f64: with a margin for their rounding in the tables)
