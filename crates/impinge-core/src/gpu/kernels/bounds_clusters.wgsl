@@ -1,11 +1,12 @@
 // Stage `bounds`, first kernel: the box of each cluster.
 //
-// In: unique vertices of clusters `first .. first + count`, positions. Out: the boxes of the nodes with these numbers; in a step, then
-// those at the end.
-// One workgroup per cluster and end. Each lane takes every 64th vertex; then two steps reduce eight boxes to one.
+// In: unique vertices of clusters `first .. first + count`, positions. Out: the boxes of the nodes
+// with these numbers; in a step, then those at the end.
+// One workgroup per cluster and end. Each lane takes every 64th vertex; then two steps reduce eight
+// boxes to one.
 // Cost: 12 bytes per vertex and 4 per index, for each unique vertex of a cluster once.
-// Invariant: a box holds all its vertices exactly, or widened by `slack` when they were rounded; for safe
-// distances by `reach` too.
+// Invariant: a box holds all its vertices exactly, or widened by `slack` when they were rounded;
+// for safe distances by `reach` too.
 
 @group(0) @binding(0) var<storage, read> clusters: array<Cluster>;
 @group(0) @binding(1) var<storage, read> cluster_vertices: array<u32>;

@@ -1,8 +1,8 @@
 // Stage `bounds` of `Cells`: the elements within their body's reach, with their boxes.
 //
-// In: clusters, corners, positions, reaches. Out: kept elements, in any order; those that do not fit are
-// counted. One workgroup per cluster, one lane per element. Cost: every element once, unless its cluster
-// is out of reach.
+// In: clusters, corners, positions, reaches. Out: kept elements, in any order; those that do not
+// fit are counted. One workgroup per cluster, one lane per element. Cost: every element once,
+// unless its cluster is out of reach.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
 @group(0) @binding(1) var<storage, read> clusters: array<Cluster>;

@@ -1,11 +1,12 @@
-// Stage `bounds` of `Cells`: each body's reach, the box in which it may meet others, and the region of all reaches.
+// Stage `bounds` of `Cells`: each body's reach, the box in which it may meet others, and the region
+// of all reaches.
 //
-// In: boxes of bodies (roots of the trees), the tree over bodies if there is one. Out: one reach per
-// body; the region, by atomic maxima of keys and of their complements.
-// One thread per body walks the tree over bodies. Cost: the nodes whose boxes meet the body's box. Beyond a limit
-// the whole box becomes the reach: that discards less, which is always right.
-// Reason for the discard in the next kernel: the boxes of a pair share a point. It lies in both bodies'
-// boxes, so each element meets the intersection of the two.
+// In: boxes of bodies (roots of the trees), the tree over bodies if there is one. Out: one reach
+// per body; the region, by atomic maxima of keys and of their complements.
+// One thread per body walks the tree over bodies. Cost: the nodes whose boxes meet the body's box.
+// Beyond a limit the whole box becomes the reach: that discards less, which is always right.
+// Reason for the discard in the next kernel: the boxes of a pair share a point. It lies in both
+// bodies' boxes, so each element meets the intersection of the two.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
 @group(0) @binding(1) var<storage, read> bodies: array<Body>;
@@ -57,8 +58,8 @@ fn main(
             visit(body, other);
         }
     } else {
-        // Eight children per level: seven wait while one is walked, and no tree over bodies has more than
-        // eleven levels.
+        // Eight children per level: seven wait while one is walked, and no tree over bodies has
+        // more than eleven levels.
         var stack: array<u32, 88>;
         stack[0] = params.first;
         var n_waiting = 1u;

@@ -1,7 +1,7 @@
 // Stage `bounds`, third kernel: all the narrow levels at the top of the trees in one launch.
 //
-// One workgroup walks levels `first .. first + count` upward, with a barrier between levels instead of
-// one launch per level. Cost: the boxes of these levels, read and written once.
+// One workgroup walks levels `first .. first + count` upward, with a barrier between levels instead
+// of one launch per level. Cost: the boxes of these levels, read and written once.
 
 @group(0) @binding(0) var<storage, read> bodies: array<Body>;
 @group(0) @binding(1) var<storage, read> levels: array<Level>;

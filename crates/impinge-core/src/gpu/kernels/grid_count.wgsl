@@ -1,4 +1,5 @@
-// Stage `grid`, fourth kernel: the number of entries of each cell's list, and which bodies have any.
+// Stage `grid`, fourth kernel: the number of entries of each cell's list, and which bodies have
+// any.
 //
 // In: kept elements, the grid. Out: ranges after the shift; for each cell the number of entries,
 // the highest and the lowest body. One thread per kept element, one pass over the cells it touches.

@@ -4,7 +4,8 @@
 // One thread per kept element.
 // Invariant: boxes that overlap have ranges that overlap. A coordinate in units of cells is
 // wrong by less than 2^-4 cells (65,536 cells, four roundings), however the compiler
-// arranges the operations; low ends move down and high ends up by a quarter of a cell before they are floored.
+// arranges the operations; low ends move down and high ends up by a quarter of a cell before they
+// are floored.
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;
 @group(0) @binding(1) var<storage, read_write> kept: array<Kept>;

@@ -2,11 +2,11 @@
 //
 //   R_i = d_i (lambda N / V)^(1/3)
 //
-// In: the region, the number N of elements kept. Out: the grid, and arguments for dispatches over kept
-// elements. Cost: one thread.
-// Where the region is so thin along an axis that the equation gives less than one cell, the axis gets
-// one cell and the others share the cells: a flat cloth, with V = 0, gets a grid of squares.
-// The answer does not depend on the resolution, so plain floats are enough.
+// In: the region, the number N of elements kept. Out: the grid, and arguments for dispatches over
+// kept elements. Cost: one thread. Where the region is so thin along an axis that the equation
+// gives less than one cell, the axis gets one cell and the others share the cells: a flat cloth,
+// with V = 0, gets a grid of squares. The answer does not depend on the resolution, so plain floats
+// are enough.
 
 @group(0) @binding(0) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(1) var<storage, read_write> tallies: array<atomic<u32>>;

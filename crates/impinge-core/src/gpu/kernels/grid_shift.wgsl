@@ -1,9 +1,9 @@
 // Stage `grid`, third kernel: how often the grid is halved.
 //
-// In: entries of the cell lists for every shift. Out: the least shift with at most 16 entries per kept
-// element on average and at most 32,768 for any one, and arguments for a dispatch over cells. Cost: one
-// thread. A huge element would touch every cell of a fine grid; this bounds the lists' memory and the work
-// of one thread.
+// In: entries of the cell lists for every shift. Out: the least shift with at most 16 entries per
+// kept element on average and at most 32,768 for any one, and arguments for a dispatch over cells.
+// Cost: one thread. A huge element would touch every cell of a fine grid; this bounds the lists'
+// memory and the work of one thread.
 
 @group(0) @binding(0) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(1) var<storage, read_write> tallies: array<atomic<u32>>;

@@ -1,4 +1,5 @@
-// Stage `narrow`, first: candidates that the question leaves out because of their elements become NOTHING.
+// Stage `narrow`, first: candidates that the question leaves out because of their elements become
+// NOTHING.
 //
 // In: candidates; the rules, see `gpu/left_out.rs`. Out: the same list. One thread per candidate.
 // Cost: 32 bytes of corners, a mark per corner; where there are lists, up to 32 binary searches.
@@ -84,7 +85,8 @@ fn has_in_list(lists: u32, vertex: u32, other: u32) -> bool {
     return false;
 }
 
-// Whether some vertex of one has some vertex of the other in its list. Corners that are repeated come last.
+// Whether some vertex of one has some vertex of the other in its list. Corners that are repeated
+// come last.
 fn are_listed(a: vec4<u32>, b: vec4<u32>) -> bool {
     let lists = rules[RULES_LISTS];
     if lists == 0u {

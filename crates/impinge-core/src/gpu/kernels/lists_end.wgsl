@@ -1,7 +1,9 @@
-// Stage `narrow` of a frame or a step whose lists stay on the device, last kernel: says whether the lists are complete.
+// Stage `narrow` of a frame or a step whose lists stay on the device, last kernel: says whether the
+// lists are complete.
 //
-// In: counters; the room that all buffers had. Out: for each list the number of pairs that it has, or a number above its room if pairs
-// may be missing. Then also 0 for all times until which pairs of a step are free. One thread per unsure pair that there is room for.
+// In: counters; the room that all buffers had. Out: for each list the number of pairs that it has,
+// or a number above its room if pairs may be missing. Then also 0 for all times until which pairs
+// of a step are free. One thread per unsure pair that there is room for.
 // Invariant: a number that is not above the room of its list counts every pair.
 //
 // The counters of the lists stay as they are, for the host: room grows with what was needed.

@@ -1,7 +1,8 @@
 // Stage `narrow`: the filter with three answers.
 //
-// In: candidates. Out: keys of pairs that certainly intersect, and keys of unsure pairs for exact arithmetic
-// on the host. One thread per candidate. Cost: 32 bytes of corners and 72 (96) of positions read.
+// In: candidates. Out: keys of pairs that certainly intersect, and keys of unsure pairs for exact
+// arithmetic on the host. One thread per candidate. Cost: 32 bytes of corners and 72 (96) of
+// positions read.
 // Invariant: yes and no are proofs, whatever the device's rounding (`docs/exactness.md`).
 //
 // A triangle's fourth corner repeats its third. `WITH_SOLIDS` is false when no body has

@@ -1,14 +1,16 @@
-// Stage `narrow` of a step whose elements keep a distance: which candidates certainly keep it, and until when each other one does.
+// Stage `narrow` of a step whose elements keep a distance: which candidates certainly keep it, and
+// until when each other one does.
 //
-// In: candidates; how thick each vertex is, half of the separation included. Out: all that may come nearer, and at the same places the time
-// until which each certainly does not. One thread per candidate.
-// Cost: 32 bytes of corners, 96 of positions and 24 of thickness read; up to N_ROUNDS rounds, each of about 20 products of a direction and
-// four corners.
-// Invariant: what is dropped is proven to keep its distance, and so are the times, whatever the device's rounding (`docs/exactness.md`,
-// "Distances that are kept on the GPU").
+// In: candidates; how thick each vertex is, half of the separation included. Out: all that may come
+// nearer, and at the same places the time until which each certainly does not. One thread per
+// candidate.
+// Cost: 32 bytes of corners, 96 of positions and 24 of thickness read; up to N_ROUNDS rounds, each
+// of about 20 products of a direction and four corners.
+// Invariant: what is dropped is proven to keep its distance, and so are the times, whatever the
+// device's rounding (`docs/exactness.md`, "Distances that are kept on the GPU").
 //
-// Along a direction every corner of the difference polygon goes on evenly. So what is beyond the distance at two times, along the same
-// direction, is so at any time between:
+// Along a direction every corner of the difference polygon goes on evenly. So what is beyond the
+// distance at two times, along the same direction, is so at any time between:
 //
 //   find   directions across which the elements are apart now, as for safe distances
 //   guess  for each along which a bound holds now: about the time when the first corner comes too near
@@ -36,7 +38,8 @@ const GOES: f32 = 0.998;
 var<workgroup> directions: array<vec3<f32>, 64u * N_DIRECTIONS>;
 var<workgroup> guesses: array<u32, 64u * N_DIRECTIONS>;
 
-// Directions across which the elements may be apart at a time, towards the polygon. However wrong they are, bounds hold.
+// Directions across which the elements may be apart at a time, towards the polygon. However wrong
+// they are, bounds hold.
 fn find(pair: ptr<function, Pair>, time: u32, lane: u32) {
     let points = at((*pair).polygon.corners, time);
     let edges = at((*pair).polygon.edges, time);
@@ -67,7 +70,8 @@ fn height(n: vec3<f32>, pair: ptr<function, Pair>, time: u32) -> f32 {
     return least(dot_four(n, at((*pair).polygon.corners, time)) - error);
 }
 
-// A number below what is left of the distance of two elements at a time, besides the one that they keep: 0 if nothing is certain.
+// A number below what is left of the distance of two elements at a time, besides the one that they
+// keep: 0 if nothing is certain.
 fn left_at(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, both: f32) -> f32 {
     let apart = max(0.0, quotient(height(n, pair, time), n) - (*pair).sizes.slack) * BELOW;
     return besides_thickness(apart * scale_of((*pair).sizes.scale), both);
@@ -84,7 +88,8 @@ fn ticks_until(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, gone: f32) ->
     return select(min(u32(f32(rest) * clamp(share, 0.0, 1.0)), rest), rest, share >= 1.0);
 }
 
-// A guess until when two elements keep their distance along a direction: later than a time only if they certainly do at that time.
+// A guess until when two elements keep their distance along a direction: later than a time only if
+// they certainly do at that time.
 fn guess(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, both: f32) -> u32 {
     let left = left_at(n, pair, time, both);
     if left == 0.0 {
@@ -93,7 +98,8 @@ fn guess(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, both: f32) -> u32 {
     return time + ticks_until(n, pair, time, GOES * left * (*pair).sizes.scale * sqrt(dot3(n, n)));
 }
 
-// Until when two elements certainly keep their distance along a direction, from a time on, by a guess.
+// Until when two elements certainly keep their distance along a direction, from a time on, by a
+// guess.
 fn free_until(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, guessed: u32, both: f32) -> u32 {
     var length = guessed - time;
     for (var n_tries = 0u; n_tries < N_TRIES && length > 0u; n_tries++) {

@@ -1,8 +1,10 @@
-// Stage `narrow` of a step: which candidates certainly do not touch while they move, by tests of the whole step.
+// Stage `narrow` of a step: which candidates certainly do not touch while they move, by tests of
+// the whole step.
 //
 // In: candidates. Out: all others, for `narrow_search`. One thread per candidate.
 // Cost: 32 bytes of corners and 96 of positions read.
-// Invariant: what is dropped is proven not to touch, whatever the device's rounding (`docs/exactness.md`).
+// Invariant: what is dropped is proven not to touch, whatever the device's rounding
+// (`docs/exactness.md`).
 
 @group(0) @binding(0) var<storage, read> candidates: array<Candidate>;
 @group(0) @binding(1) var<storage, read> corners: array<vec4<u32>>;

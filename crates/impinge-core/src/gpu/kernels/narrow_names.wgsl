@@ -1,7 +1,8 @@
-// Stage `narrow` of a step whose elements keep a distance, second kernel: names the pairs that `narrow_keep` has left.
+// Stage `narrow` of a step whose elements keep a distance, second kernel: names the pairs that
+// `narrow_keep` has left.
 //
-// In: pairs. Out: the same pairs at the same places, by their slots for the host, or by global numbers for the caller's shaders; their
-// number. One thread per pair.
+// In: pairs. Out: the same pairs at the same places, by their slots for the host, or by global
+// numbers for the caller's shaders; their number. One thread per pair.
 
 @group(0) @binding(0) var<storage, read> pairs: array<PairKey>;
 @group(0) @binding(1) var<storage, read> order: array<u32>;

@@ -1,20 +1,23 @@
-// Stage `narrow` of safe distances: how far the vertices of two elements may move, so that the elements do not touch.
+// Stage `narrow` of safe distances: how far the vertices of two elements may move, so that the
+// elements do not touch.
 //
-// In: candidates; the most that each vertex may move, 0 if it is fixed; how thick each is, or one number where none is thick. Out: per
-// vertex, the bits of the least number that its pairs leave it. One thread per candidate.
-// Cost: 32 bytes of corners and 48 of positions read; 20 products of a direction and a corner; up to six atomics. Of thick bodies 24
-// bytes more.
-// Invariant: a number is at most what a lower bound of the distance gives, whatever the device's rounding (`docs/exactness.md`, "Safe
-// distances on the GPU").
+// In: candidates; the most that each vertex may move, 0 if it is fixed; how thick each is, or one
+// number where none is thick. Out: per vertex, the bits of the least number that its pairs leave
+// it. One thread per candidate.
+// Cost: 32 bytes of corners and 48 of positions read; 20 products of a direction and a corner; up
+// to six atomics. Of thick bodies 24 bytes more.
+// Invariant: a number is at most what a lower bound of the distance gives, whatever the device's
+// rounding (`docs/exactness.md`, "Safe distances on the GPU").
 //
-// The difference polygon of two elements is as far from the origin as the elements are apart. So for any direction n, the least of
-// n . V over its corners, by the length of n, is a lower bound:
+// The difference polygon of two elements is as far from the origin as the elements are apart. So
+// for any direction n, the least of n . V over its corners, by the length of n, is a lower bound:
 //
 //   find      five directions: of the nearest point of each edge, and across the polygon. However wrong they are, bounds hold
 //   measure   the least n . V, minus what rounding may add
 //   divide    by a length that is checked by products
 //
-// Each step leaves its numbers in workgroup memory: a compiler that computed a direction twice might round it in two ways.
+// Each step leaves its numbers in workgroup memory: a compiler that computed a direction twice
+// might round it in two ways.
 
 const N_DIRECTIONS: u32 = 5u;
 
@@ -88,7 +91,8 @@ fn load(candidate: Candidate) -> Polygon {
     return polygon;
 }
 
-// A number below the least of n . V, or of -n . V, over all corners: by how much they are certainly on one side.
+// A number below the least of n . V, or of -n . V, over all corners: by how much they are certainly
+// on one side.
 fn height(n: vec3<f32>, polygon: ptr<function, Polygon>) -> f32 {
     var low = 0x1p100f;
     var opposite = 0x1p100f;

@@ -1,18 +1,21 @@
-// Stage `narrow` of a step: which pairs certainly do not touch, and which certainly do, by tests of intervals of time.
+// Stage `narrow` of a step: which pairs certainly do not touch, and which certainly do, by tests of
+// intervals of time.
 //
-// In: pairs that `narrow_moving` has left. Out: all that may touch, by their places for the host, which decides them, or by global
-// numbers for the caller's shaders. For each a time until which it certainly does not touch, and one by which it certainly does, if
-// there is one. For the whole step the least of the latter. One thread per pair.
+// In: pairs that `narrow_moving` has left. Out: all that may touch, by their places for the host,
+// which decides them, or by global numbers for the caller's shaders. For each a time until which it
+// certainly does not touch, and one by which it certainly does, if there is one. For the whole step
+// the least of the latter. One thread per pair.
 // Cost: 32 bytes of corners and 96 of positions read; up to N_INTERVALS intervals tested.
-// Invariant: what is dropped is proven not to touch, or to touch later than another pair; and so are the times, whatever
-// the device's rounding (`docs/exactness.md`).
+// Invariant: what is dropped is proven not to touch, or to touch later than another pair; and so
+// are the times, whatever the device's rounding (`docs/exactness.md`).
 //
 //   [low, high] ── certainly free ────> go on behind it, with twice the length, to the end: dropped
 //        ├──────── certain contact ──> touches by `high`; half the length, to know it better
 //        └──────── unclear ──────────> half the length, down to SHORTEST: left, free until `low`
 //
-// Where the earliest contact is sought, the end is the least time by which any pair touches. So most pairs are dropped after one
-// interval. Where any contact is sought, all threads end once there is one.
+// Where the earliest contact is sought, the end is the least time by which any pair touches. So
+// most pairs are dropped after one interval. Where any contact is sought, all threads end once
+// there is one.
 
 // The shortest interval: a 1024th of the step.
 const SHORTEST: u32 = 0x4000u;

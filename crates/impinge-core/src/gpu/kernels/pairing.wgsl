@@ -1,18 +1,19 @@
-// Stage `pairing`: which elements of two clusters have boxes that meet. In a step, boxes at both ends.
+// Stage `pairing`: which elements of two clusters have boxes that meet. In a step, boxes at both
+// ends.
 //
 // In: work items. Out: candidates. One workgroup of 64 per work item:
 //
-// 1. Each lane computes the box of one element of each cluster. Elements that do not meet the other cluster's box
-//    drop out, for a partner's box lies in its cluster's box.
-// 2. Lanes take the side with more survivors and walk over the survivors of the other side: one 64-bit
-//    mask per element, bit j for partner j, as two words:
+// 1. Each lane computes the box of one element of each cluster. Elements that do not meet the other
+//    cluster's box drop out, for a partner's box lies in its cluster's box.
+// 2. Lanes take the side with more survivors and walk over the survivors of the other side: one
+//    64-bit mask per element, bit j for partner j, as two words:
 //
 //       mask.x  bits 0..31  partners  0..31
 //       mask.y  bits 0..31  partners 32..63
 //
-// 3. Within one body, partners that share a vertex id are cleared, or marked as neighbours if they are
-//    to be resolved. The ids are in workgroup memory; comparing them costs less
-//    than reading adjacency masks would, and needs no special case for vertices with many elements.
+// 3. Within one body, partners that share a vertex id are cleared, or marked as neighbours if they
+//    are to be resolved. The ids are in workgroup memory; comparing them costs less than reading
+//    adjacency masks would, and needs no special case for vertices with many elements.
 // 4. One atomic per workgroup reserves room; candidates that do not fit are counted.
 //
 // Cost: 128 elements read, min(survivors) steps of one box test per lane.
@@ -36,7 +37,8 @@ var<workgroup> survivors: array<atomic<u32>, 4>;
 var<workgroup> n_found: atomic<u32>;
 var<workgroup> first_found: u32;
 
-// Stores an element's box in its entry; false if there is no element or its box misses the other cluster's.
+// Stores an element's box in its entry; false if there is no element or its box misses the other
+// cluster's.
 fn load(cluster: Cluster, lane: u32, entry: u32, others: Extent) -> bool {
     if lane >= (cluster.sizes & 0xffffu) {
         return false;

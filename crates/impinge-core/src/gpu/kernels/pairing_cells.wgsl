@@ -1,20 +1,22 @@
 // Stage `pairing` of `Cells`: the paper's second level. One workgroup of 64 per work item.
 //
-// 1. Each lane writes the occupancy of one element of group b: bit x + 4 y + 16 z for sub-cell (x, y, z):
+// 1. Each lane writes the occupancy of one element of group b: bit x + 4 y + 16 z for sub-cell (x,
+//    y, z):
 //
 //       mask.x   31 … 16 | 15 … 12   11 … 8   7 … 4   3 2 1 0
 //                 z = 1     y = 3     y = 2   y = 1   x of y = 0, z = 0
 //       mask.y    z = 3     z = 2
 //
-// 2. The 64 masks are transposed in workgroup memory: lane s gathers bit s of all of them, the membership
-//    of sub-cell s.
+// 2. The 64 masks are transposed in workgroup memory: lane s gathers bit s of all of them, the
+//    membership of sub-cell s.
 //
 //       masks of b       row j, bit s: element j touches sub-cell s
 //       membership       row s, bit j: the same
 //
 // 3. The partners of an element of group a are the OR of the memberships of its own sub-cells.
-// 4. Partners whose boxes do not meet, whose bodies do not meet, or which another cell owns are cleared.
-//    The owner of a pair is the cell with max(low_a, low_b): exact, and without the paper's hash table.
+// 4. Partners whose boxes do not meet, whose bodies do not meet, or which another cell owns are
+//    cleared. The owner of a pair is the cell with max(low_a, low_b): exact, and without the
+//    paper's hash table.
 // 5. One atomic per workgroup reserves room for candidates; those that do not fit are counted.
 //
 // Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 3.2.
@@ -71,7 +73,8 @@ fn is_owner(cell: vec3<u32>, a: vec3<u32>, b: vec3<u32>) -> bool {
     return all(low >> vec3<u32>(2u) == cell);
 }
 
-// Of the partners in one word of a mask: those that stay, and those that share a vertex and are to be resolved.
+// Of the partners in one word of a mask: those that stay, and those that share a vertex and are to
+// be resolved.
 fn decide_partners(partners: u32, first: u32, own: Kept, cell: vec3<u32>) -> vec2<u32> {
     var rest = partners;
     var stay = vec2<u32>(0u);

@@ -1,6 +1,7 @@
 // Stage `narrow` of safe distances, last kernel: takes everything back if pairs were lost.
 //
-// In: counters; the room that queues, work items and candidates had. Out: 0 for all vertices if any of it was too small.
+// In: counters; the room that queues, work items and candidates had. Out: 0 for all vertices if any
+// of it was too small.
 // Invariant: no number is left that pairs which did not fit might have lowered.
 
 @group(0) @binding(0) var<storage, read_write> counters: array<atomic<u32>>;

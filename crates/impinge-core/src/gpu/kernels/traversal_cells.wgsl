@@ -1,13 +1,14 @@
 // Stage `traversal` of `Cells`: room for the lists of cells that matter, and their work items.
 //
-// In: cells. Out: where each list starts; a work item for every pair of groups of the list, equation (4).
+// In: cells. Out: where each list starts; a work item for every pair of groups of the list,
+// equation (4).
 // One thread per cell. Cells with elements of only one body are culled, unless its self-collision
 // is queried. Instead of a prefix sum over all cells, a workgroup reserves the room that its cells
 // need: lists then lie in any order, which does no harm.
 //
-// Where we deviate from the paper: groups are cut from the whole list, bodies mixed, and level 2 clears partners of
-// bodies that do not meet. A cell of five elements of one body and five of another is one work item of ten, and
-// no list has to be sorted.
+// Where we deviate from the paper: groups are cut from the whole list, bodies mixed, and level 2
+// clears partners of bodies that do not meet. A cell of five elements of one body and five of
+// another is one work item of ten, and no list has to be sorted.
 //
 //   groups   0   1   2          items: the upper triangle, diagonal included
 //      0     x   x   x

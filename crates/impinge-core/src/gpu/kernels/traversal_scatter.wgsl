@@ -1,6 +1,7 @@
 // Stage `traversal` of `Cells`, second kernel: fills the lists of the cells that have one.
 //
-// In: kept elements, where lists start. Out: entries, which are numbers of kept elements, in any order.
+// In: kept elements, where lists start. Out: entries, which are numbers of kept elements, in any
+// order.
 // One thread per kept element. Counts run down to hand out slots.
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;

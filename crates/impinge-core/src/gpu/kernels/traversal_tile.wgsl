@@ -1,8 +1,10 @@
-// Stage `traversal` of `Cells` for a crowded cell, whose list an earlier pass has filled: the work items of
-// one tile of the product of its groups, equation (4).
+// Stage `traversal` of `Cells` for a crowded cell, whose list an earlier pass has filled: the work
+// items of one tile of the product of its groups, equation (4).
 //
-// In: the number of entries of the list, which begins at entry 0. Out: work items. One thread per pair of groups.
-// Invariant: nothing writes the list between the passes over its tiles, so every pair of entries comes up once.
+// In: the number of entries of the list, which begins at entry 0. Out: work items. One thread per
+// pair of groups.
+// Invariant: nothing writes the list between the passes over its tiles, so every pair of entries
+// comes up once.
 //
 //   groups   0   1   2   3      tiles of side 2: (0, 0), (0, 2), (2, 2); each without its part
 //      0     x   x | x   x      below the diagonal

@@ -1,14 +1,18 @@
-// Stage `truncate`: moves each vertex of a body towards the position that is wished for it, at most as far as it may.
+// Stage `truncate`: moves each vertex of a body towards the position that is wished for it, at most
+// as far as it may.
 //
-// In: how far each vertex may move; where it is, and the wished position. Out: the wished position where it is certainly near enough,
-// else one on the way to it that is, else where the vertex is. One thread per vertex.
+// In: how far each vertex may move; where it is, and the wished position. Out: the wished position
+// where it is certainly near enough, else one on the way to it that is, else where the vertex is.
+// One thread per vertex.
 // Cost: 28 bytes read and 12 written per vertex.
-// Invariant: no vertex moves farther than it may, whatever the device's rounding (`docs/exactness.md`, "Safe distances on the GPU").
+// Invariant: no vertex moves farther than it may, whatever the device's rounding
+// (`docs/exactness.md`, "Safe distances on the GPU").
 //
-// The position on the way is checked as it is stored. It is left in workgroup memory first: a compiler that computed it twice might
-// round it in two ways.
+// The position on the way is checked as it is stored. It is left in workgroup memory first: a
+// compiler that computed it twice might round it in two ways.
 
-// Vertices that may move less stay where they are: nothing that is flushed matters beside what others may.
+// Vertices that may move less stay where they are: nothing that is flushed matters beside what
+// others may.
 const LEAST_ROOM: f32 = 0x1p-90f;
 
 @group(0) @binding(0) var<storage, read> shares: array<f32>;
@@ -36,7 +40,8 @@ fn is_within(start: vec3<u32>, end: vec3<u32>, room: f32) -> bool {
     return dot3(d, d) * (1.0 + OF_PRODUCT) <= r * r * (1.0 - OF_PRODUCT);
 }
 
-// A position on the way that is about as far as the room allows, and by its own rounding not farther.
+// A position on the way that is about as far as the room allows, and by its own rounding not
+// farther.
 fn on_the_way(start: vec3<u32>, end: vec3<u32>, room: f32) -> vec3<u32> {
     let widest = bitcast<f32>(max(magnitude(start), magnitude(end)));
     let aim = room * (1.0 - 0x1p-16f) - 0x1p-21f * widest;

@@ -3,8 +3,8 @@
 //   sign 0   1 b30 … b0       (set the sign bit)
 //   sign 1   ~b31 … ~b0       (flip everything)        -0 is taken as +0
 //
-// Integers are exact on every device: no flushing of subnormals, no rounding, no NaN. Moving by two keys moves
-// by at least one f32 (the key of -0 is never used, hence two).
+// Integers are exact on every device: no flushing of subnormals, no rounding, no NaN. Moving by two
+// keys moves by at least one f32 (the key of -0 is never used, hence two).
 
 fn key(bits: u32) -> u32 {
     let canonical = select(bits, 0u, bits == FLAG);
@@ -20,8 +20,9 @@ fn float_of(key: u32) -> f32 {
     return bitcast<f32>(select(~key, key & ~FLAG, key >= FLAG));
 }
 
-// A key that is lower by a length and more, and one that is higher: the sum is off by at most one f32, or by a subnormal
-// number, which the length allows for. Numbers that have no room for it stay as they are but for two keys.
+// A key that is lower by a length and more, and one that is higher: the sum is off by at most one
+// f32, or by a subnormal number, which the length allows for. Numbers that have no room for it stay
+// as they are but for two keys.
 fn lowered(low: u32, reach: f32) -> u32 {
     let inside = clamp(low, 0x017fffffu, 0xfe800000u); // up to 2^126
     return min(low, key(bitcast<u32>(float_of(inside) - reach))) - 2u;

@@ -1,4 +1,5 @@
-// Lower bounds of the distance of two elements, from directions that are found anyhow: `docs/exactness.md`, "Safe distances on the GPU".
+// Lower bounds of the distance of two elements, from directions that are found anyhow:
+// `docs/exactness.md`, "Safe distances on the GPU".
 // Binding: `thickness`.
 
 // Of numbers that are flushed.
@@ -7,7 +8,8 @@ const FLUSHED: f32 = 0x1p-76f;
 const LOWEST: f32 = 0x1p-40f;
 // What is left of a quotient, so that it passes the check.
 const BELOW: f32 = 0x0.ffffcp0f; // 1 - 2^-18
-// Shorter distances, in the caller's unit, count as 0: nothing that is flushed is called a distance.
+// Shorter distances, in the caller's unit, count as 0: nothing that is flushed is called a
+// distance.
 const SHORTEST: f32 = 0x1p-100f;
 
 // A direction whose largest coordinate is in [1, 2), or none: 0.
@@ -38,8 +40,8 @@ fn towards(corner: vec3<f32>, edge: vec3<f32>) -> vec3<f32> {
     return nearest - (dot3(nearest, edge) / square) * edge;
 }
 
-// A number below a height divided by the length of a direction: checked by products. If the height is computed once more, it may be another
-// one: also a number below, but perhaps negative.
+// A number below a height divided by the length of a direction: checked by products. If the height
+// is computed once more, it may be another one: also a number below, but perhaps negative.
 fn quotient(low: f32, n: vec3<f32>) -> f32 {
     let height = max(low, 0.0);
     if height < LOWEST {

@@ -1,5 +1,5 @@
-// Whether the filters of two bodies agree, and whether the query ignores the pair. The list of ignored pairs is sorted, lower
-// body first.
+// Whether the filters of two bodies agree, and whether the query ignores the pair. The list of
+// ignored pairs is sorted, lower body first.
 
 fn is_ignored(a: u32, b: u32) -> bool {
     var low = 0u;

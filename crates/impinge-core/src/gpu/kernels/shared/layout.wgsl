@@ -11,8 +11,8 @@ const WIDEST: u32 = 32768u;
 //         |       0       | gate |  height  | children |
 //         +---------------+------+----------+----------+
 //
-// Height 0: a cluster; `first_child` is its number. Gate: the entrance to a body; `first_child` is the
-// body's number and the only child is the body's root. Else: children have consecutive numbers.
+// Height 0: a cluster; `first_child` is its number. Gate: the entrance to a body; `first_child` is
+// the body's number and the only child is the body's root. Else: children have consecutive numbers.
 struct Node {
     low: vec3<u32>,
     first_child: u32,
@@ -26,16 +26,17 @@ const GATE: u32 = 0x1000u;
 // The nodes of one height.
 struct Level { first: u32, count: u32 }
 
-// One part of the frame: of a body one, in a step up to three. `slack`: by how many keys its boxes are widened, for
-// rounded positions. In a step, the bits of `part`:
+// One part of the frame: of a body one, in a step up to three. `slack`: by how many keys its boxes
+// are widened, for rounded positions. In a step, the bits of `part`:
 //
 //   part  31             5      4        3       2     1   0
 //         +----------------+------------+--------+------+------+
 //         |  body number   | own parts | points | bare | part |
 //         +----------------+------------+--------+------+------+
 //
-// Own parts: pairs with other parts of the same body are asked for. Points, bare: the body has no edges, no faces.
-// `first_slot`, `first_number`: those of its first element; records are in the order of their places.
+// Own parts: pairs with other parts of the same body are asked for. Points, bare: the body has no
+// edges, no faces. `first_slot`, `first_number`: those of its first element; records are in the
+// order of their places.
 struct Body {
     root: u32,
     slack: u32,
@@ -72,15 +73,17 @@ struct Cluster {
 struct NodePair { a: u32, b: u32 }
 struct WorkItem { a: u32, b: u32 }
 
-// Two slots. Bit 31 of `a`: positions were rounded. Bit 31 of `b`: the two share a vertex; in a step, `a` is an edge.
+// Two slots. Bit 31 of `a`: positions were rounded. Bit 31 of `b`: the two share a vertex; in a
+// step, `a` is an edge.
 struct Candidate { a: u32, b: u32 }
 
-// Two global element numbers, the lower one first. In a step, a pair key is a candidate; and an unsure key has two slots, if the
-// host decides it.
+// Two global element numbers, the lower one first. In a step, a pair key is a candidate; and an
+// unsure key has two slots, if the host decides it.
 struct PairKey { low: u32, high: u32 }
 struct UnsureKey { low: u32, high: u32 }
 
-// Of a pair of a step: until when it certainly does not touch, and by when it certainly does; 2 if that is not certain.
+// Of a pair of a step: until when it certainly does not touch, and by when it certainly does; 2 if
+// that is not certain.
 struct PairTimes { free_until: f32, touches_by: f32 }
 
 // Parameters of one dispatch.
@@ -88,7 +91,8 @@ struct Params {
     // bounds: the clusters, nodes or levels to refit. traversal: the round.
     first: u32,
     count: u32,
-    // prepare: the counter to read, elements per workgroup, the most elements, the slot for the arguments.
+    // prepare: the counter to read, elements per workgroup, the most elements, the slot for the
+    // arguments.
     counter: u32,
     per_group: u32,
     capacity: u32,
@@ -97,14 +101,15 @@ struct Params {
     n_ignored: u32,
     // 1 when pairs that share a vertex are resolved, 0 when they are left out.
     resolve: u32,
-    // Cells: elements per group, cells per element (bits of an f32), the most cells there is room for.
+    // Cells: elements per group, cells per element (bits of an f32), the most cells there is room
+    // for.
     group_size: u32,
     lambda: u32,
     most_cells: u32,
     // Methods of other crates: 1 when only the cell that owns a pair tests it.
     owner_rule: u32,
-    // Cells: 1 when lists are filled but no work items are made. Then, for one cell at a time: its entries, and
-    // the tile of the product of its groups.
+    // Cells: 1 when lists are filled but no work items are made. Then, for one cell at a time: its
+    // entries, and the tile of the product of its groups.
     lists_only: u32,
     n_entries: u32,
     tile_row: u32,
@@ -118,8 +123,8 @@ struct Params {
     kinds: u32,
     // Steps that keep a distance, and safe distances: how far boxes are widened (bits of an f32).
     reach: u32,
-    // Last kernels of what stays on the device: the room of all buffers before the lists (that of candidates is `capacity`), of pairs,
-    // and of pairs that a step searches (0 in a frame).
+    // Last kernels of what stays on the device: the room of all buffers before the lists (that of
+    // candidates is `capacity`), of pairs, and of pairs that a step searches (0 in a frame).
     queue_room: u32,
     items_room: u32,
     kept_room: u32,
@@ -159,7 +164,8 @@ struct Reach {
     high: vec3<u32>,
 }
 
-// The grid. A coarse cell has four fine cells along each axis; `shift` halvings make all of them coarser.
+// The grid. A coarse cell has four fine cells along each axis; `shift` halvings make all of them
+// coarser.
 struct Grid {
     origin: vec3<f32>,
     shift: u32,
@@ -172,7 +178,8 @@ struct Grid {
     unused_too: u32,
 }
 
-// A coarse cell: the number of entries, the highest body with an entry, and the complement of the lowest.
+// A coarse cell: the number of entries, the highest body with an entry, and the complement of the
+// lowest.
 struct Cell {
     n_entries: atomic<u32>,
     highest: atomic<u32>,
@@ -208,15 +215,17 @@ const N_SUBDIVIDED: u32 = 39u;
 // Low and high word; only some methods count box tests.
 const N_BOX_TESTS: u32 = 40u;
 const N_BOX_TESTS_HIGH: u32 = 41u;
-// Steps: the least time by which some pair certainly touches, the bits of an f32; 2 if that is certain of none.
+// Steps: the least time by which some pair certainly touches, the bits of an f32; 2 if that is
+// certain of none.
 const TOUCHES_BY: u32 = 42u;
-// What stays on the device: the numbers of pairs and of unsure pairs, above the room of the list if any may be missing.
+// What stays on the device: the numbers of pairs and of unsure pairs, above the room of the list if
+// any may be missing.
 const N_PAIRS_LISTED: u32 = 43u;
 const N_UNSURE_LISTED: u32 = 44u;
 const N_COUNTERS: u32 = 45u;
 
-// Tallies: the region (three complements of its low end, then its high end), then the entries of the cell lists
-// for every shift, two words each, then a bit for each shift that is too fine.
+// Tallies: the region (three complements of its low end, then its high end), then the entries of
+// the cell lists for every shift, two words each, then a bit for each shift that is too fine.
 const ENTRIES_BY_SHIFT: u32 = 6u;
 const SHIFTS_TOO_FINE: u32 = 36u;
 const SHIFTS: u32 = 15u;
@@ -227,8 +236,9 @@ const NO_ROOT: u32 = 0xffffffffu;
 // A candidate that the question leaves out.
 const NOTHING: u32 = 0xffffffffu;
 
-// Words of the rules about what is left out: the number of pairs of groups, where they begin, where the lists of vertices begin (0: there
-// are none), where pairs begin, how many; then a mark per vertex.
+// Words of the rules about what is left out: the number of pairs of groups, where they begin, where
+// the lists of vertices begin (0: there are none), where pairs begin, how many; then a mark per
+// vertex.
 const RULES_N_GROUPS: u32 = 0u;
 const RULES_GROUPS: u32 = 1u;
 const RULES_LISTS: u32 = 2u;

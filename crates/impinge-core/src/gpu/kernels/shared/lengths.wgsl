@@ -1,4 +1,5 @@
-// Lengths that products certify, whatever the device's rounding: `docs/exactness.md`, "Safe distances on the GPU".
+// Lengths that products certify, whatever the device's rounding: `docs/exactness.md`, "Safe
+// distances on the GPU".
 
 // Bounds of the relative error of n . V, of n . n, and of what is divided; see the proof.
 const OF_PRODUCT: f32 = 0x1p-19f;

@@ -1,5 +1,6 @@
-// Whether pairs may be missing from what a stage has read: a counter is above the room that there was, or has wrapped around. Counters
-// of later stages do not show it: these count only what reached them. `counters` and `params` are bindings of the kernel.
+// Whether pairs may be missing from what a stage has read: a counter is above the room that there
+// was, or has wrapped around. Counters of later stages do not show it: these count only what
+// reached them. `counters` and `params` are bindings of the kernel.
 fn are_lost() -> bool {
     var most = 0u;
     for (var round = 0u; round < ROUNDS; round++) {

@@ -2,8 +2,8 @@ fn is_kind_asked(kind: u32, covers: bool) -> bool {
     return select((params.kinds & kind) != 0u, covers, params.kinds == 0u);
 }
 
-// Whether elements of two different parts of a step meet: pairs of their bodies are asked for, and so is this kind of
-// pair. The same as `Plan::test` on the host.
+// Whether elements of two different parts of a step meet: pairs of their bodies are asked for, and
+// so is this kind of pair. The same as `Plan::test` on the host.
 fn meets(a: u32, b: u32) -> bool {
     let of_a = bodies[a];
     let of_b = bodies[b];

@@ -10,8 +10,9 @@ struct Extent {
     end: Box,
 }
 
-// Whether two moving boxes are not beside each other, on the same side of an axis, at both ends. If they are, they are so
-// at any time between, for what moves linearly is within the interpolation of its boxes.
+// Whether two moving boxes are not beside each other, on the same side of an axis, at both ends. If
+// they are, they are so at any time between, for what moves linearly is within the interpolation of
+// its boxes.
 fn extents_meet(a: Extent, b: Extent) -> bool {
     let a_first = (a.start.high < b.start.low) & (a.end.high < b.end.low);
     let b_first = (b.start.high < a.start.low) & (b.end.high < a.end.low);

@@ -1,4 +1,5 @@
-// The elements of two clusters in workgroup memory, where they move: the boxes at the end follow all those at the start.
+// The elements of two clusters in workgroup memory, where they move: the boxes at the end follow
+// all those at the start.
 
 fn element_extent(corner: vec4<u32>, slack: u32) -> Extent {
     let n_vertices = arrayLength(&positions) / (3u * ENDS);

@@ -1,4 +1,5 @@
-// The names of a pair of a step: by global numbers for the caller's shaders, by slots for the host. Binding: `params`.
+// The names of a pair of a step: by global numbers for the caller's shaders, by slots for the host.
+// Binding: `params`.
 
 fn name_of(pair: PairKey) -> UnsureKey {
     let a = pair.low & ~FLAG;

@@ -1,10 +1,12 @@
-// Triangles of one body that share vertices by id, in the same steps as `impinge_exact::filter::neighbours` on the CPU:
-// whether they meet beyond the part that they share.
+// Triangles of one body that share vertices by id, in the same steps as
+// `impinge_exact::filter::neighbours` on the CPU: whether they meet beyond the part that they
+// share.
 //
-// One vertex v: if one plane has the other triangle's two vertices on one side, no. If each plane has the other's
-// vertices on different sides, each triangle contains the start of one ray from v along the line where the planes
-// meet. Both rays are the same, and the answer is yes, if and only if exactly one of the two first vertices is
-// above the other's plane (`docs/exactness.md`, "Shared vertex").
+// One vertex v: if one plane has the other triangle's two vertices on one side, no. If each plane
+// has the other's vertices on different sides, each triangle contains the start of one ray from v
+// along the line where the planes meet. Both rays are the same, and the answer is yes, if and only
+// if exactly one of the two first vertices is above the other's plane (`docs/exactness.md`, "Shared
+// vertex").
 //
 //        a1       b0
 //          \     /            the second and third vertex
@@ -12,7 +14,8 @@
 //          / \ /
 //        b1   a0
 //
-// Two: no, unless coplanar; then no if the third vertices certainly lie on different sides. Three: yes, always.
+// Two: no, unless coplanar; then no if the third vertices certainly lie on different sides. Three:
+// yes, always.
 
 // One bit per vertex of `a`, set when `b` names it too.
 fn shared_by(a: vec3<u32>, b: vec3<u32>) -> u32 {

@@ -1,7 +1,7 @@
 // The difference polygon of a candidate of a step. Bindings: `corners` and `positions`.
 //
-// A vertex repeats itself, an edge its second end, a face its third corner. So an edge and a vertex are two edges of
-// which one is a point, and two vertices a vertex and a face that is a point.
+// A vertex repeats itself, an edge its second end, a face its third corner. So an edge and a vertex
+// are two edges of which one is a point, and two vertices a vertex and a face that is a point.
 
 fn vertex_bits(vertex: u32) -> vec3<u32> {
     let word = 3u * vertex;

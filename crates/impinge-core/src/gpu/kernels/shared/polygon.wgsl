@@ -1,14 +1,15 @@
-// Whether two moving elements certainly do not touch, or certainly touch, over an interval: tests of their difference polygon, as
-// `Motion` of `impinge_exact::filter::motion` has on the CPU.
+// Whether two moving elements certainly do not touch, or certainly touch, over an interval: tests
+// of their difference polygon, as `Motion` of `impinge_exact::filter::motion` has on the CPU.
 //
-// Constants, bounds and their proof: `docs/exactness.md`, "The GPU filter for moving elements". They hold under any
-// rounding direction, contraction and reassociation, with subnormals flushed or kept. All differences are scaled by one
-// power of two, so that the largest of them is in [1, 2). For positions that the host has rounded from f64, each size grows
-// by `slack`.
+// Constants, bounds and their proof: `docs/exactness.md`, "The GPU filter for moving elements".
+// They hold under any rounding direction, contraction and reassociation, with subnormals flushed or
+// kept. All differences are scaled by one power of two, so that the largest of them is in [1, 2).
+// For positions that the host has rounded from f64, each size grows by `slack`.
 
 // Errors that do not depend on sizes: of flushed numbers.
 const TINY: f32 = 0x1p-76f;
-// Bounds of f's outer coefficients, of the quartics' and of a product with the sum of all corners, by the sizes in them.
+// Bounds of f's outer coefficients, of the quartics' and of a product with the sum of all corners,
+// by the sizes in them.
 const OF_CUBIC: f32 = 0x1p-16f;
 const OF_QUARTIC: f32 = 0x1p-14f;
 const OF_SUM: f32 = 0x1p-13f;
@@ -42,8 +43,8 @@ fn crossed(d: Moving, e: Moving) -> Crossed {
     );
 }
 
-// Four vectors, by coordinate. Corners and edges are no arrays: those in a loop, which wgpu keeps compilers from unrolling, may be kept
-// outside of registers.
+// Four vectors, by coordinate. Corners and edges are no arrays: those in a loop, which wgpu keeps
+// compilers from unrolling, may be kept outside of registers.
 struct Four {
     x: vec4<f32>,
     y: vec4<f32>,
@@ -109,7 +110,8 @@ fn most(d: vec4<f32>) -> f32 {
     return max(max(d.x, d.y), max(d.z, d.w));
 }
 
-// The corners V_0 to V_3 of the difference polygon, and the edges from them; a triangle repeats the last of both.
+// The corners V_0 to V_3 of the difference polygon, and the edges from them; a triangle repeats the
+// last of both.
 struct Polygon {
     corners: MovingFour,
     edges: MovingFour,
@@ -133,14 +135,16 @@ fn parallelogram(p: Moving, q: Moving, r: Moving, s: Moving) -> Polygon {
     );
 }
 
-// Whether all corners at both ends are on one side of the plane through the origin across `direction`.
+// Whether all corners at both ends are on one side of the plane through the origin across
+// `direction`.
 fn are_aside(corners: MovingFour, direction: vec3<f32>, bound: f32) -> bool {
     let at_start = dot_four(direction, corners.start);
     let at_end = dot_four(direction, corners.end);
     return least(min(at_start, at_end)) > bound || most(max(at_start, at_end)) < -bound;
 }
 
-// What is certain of w = N . (V x E) for each edge: that all its coefficients are negative, or that all are positive.
+// What is certain of w = N . (V x E) for each edge: that all its coefficients are negative, or that
+// all are positive.
 struct Sides {
     are_outside: vec4<bool>,
     are_inside: vec4<bool>,
@@ -175,7 +179,8 @@ struct Sizes {
     are_in_range: bool,
 }
 
-// Scales all differences. `narrowing`: by how much a difference may be wrong because positions were rounded.
+// Scales all differences. `narrowing`: by how much a difference may be wrong because positions were
+// rounded.
 fn scale_all(polygon: ptr<function, Polygon>, narrowing: f32) -> Sizes {
     let corners = max(size_four((*polygon).corners.start), size_four((*polygon).corners.end));
     let edges = max(size_four((*polygon).edges.start), size_four((*polygon).edges.end));
@@ -191,8 +196,8 @@ fn scale_all(polygon: ptr<function, Polygon>, narrowing: f32) -> Sizes {
     return Sizes(corners * scale + slack, edges * scale + slack, widest * scale + slack, slack, scale, true);
 }
 
-// What is certain of two elements between the two ends of their polygon: nothing, that they do not touch, or that they do, at one time
-// strictly between.
+// What is certain of two elements between the two ends of their polygon: nothing, that they do not
+// touch, or that they do, at one time strictly between.
 const UNCLEAR: u32 = 0u;
 const FREE: u32 = 1u;
 const TOUCHES: u32 = 2u;
@@ -235,8 +240,8 @@ fn decide(polygon: Polygon, sizes: Sizes, are_edges: bool) -> u32 {
         return FREE;
     }
 
-    // Free beyond one edge all the time. Contact where the sign of f changes, and only once, and all edges are passed on the inner side
-    // all the time.
+    // Free beyond one edge all the time. Contact where the sign of f changes, and only once, and
+    // all edges are passed on the inner side all the time.
     let falls = f_0 > bound && f_3 < -bound && (f_1 > inner || f_2 < -inner);
     let rises = f_0 < -bound && f_3 > bound && (f_1 < -inner || f_2 > inner);
     let c = sizes.corners;

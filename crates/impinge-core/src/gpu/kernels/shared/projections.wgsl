@@ -1,8 +1,9 @@
-// Triangles whose images are apart after one coordinate is dropped, in the same steps as `impinge_exact::filter::projections`
-// on the CPU: neighbours in a flat mesh lie in one plane, and every determinant of the other filters is zero.
+// Triangles whose images are apart after one coordinate is dropped, in the same steps as
+// `impinge_exact::filter::projections` on the CPU: neighbours in a flat mesh lie in one plane, and
+// every determinant of the other filters is zero.
 //
-// Every value is a determinant of two differences of input points. Bound and proof: `docs/exactness.md`, "The GPU
-// filter", "Projections".
+// Every value is a determinant of two differences of input points. Bound and proof:
+// `docs/exactness.md`, "The GPU filter", "Projections".
 
 // The largest error of two determinants together, where no difference is larger than `widest`.
 fn planar_bound(widest: f32, slack: f32) -> f32 {
@@ -26,7 +27,8 @@ fn is_beyond(origin: vec2<f32>, edge: vec2<f32>, b0: vec2<f32>, b1: vec2<f32>, b
 // Whether the line of an edge of a has b strictly on one side, and a not.
 fn parts(a0: vec2<f32>, a1: vec2<f32>, a2: vec2<f32>, b0: vec2<f32>, b1: vec2<f32>, b2: vec2<f32>,
     bound: f32) -> bool {
-    // How far the vertex opposite an edge is from the edge's line: for all three edges, twice the area.
+    // How far the vertex opposite an edge is from the edge's line: for all three edges, twice the
+    // area.
     let own = cross2(a0 - a2, a1 - a0);
     let above = max(own, 0.0) + bound;
     let below = min(own, 0.0) - bound;
@@ -76,7 +78,8 @@ fn angles_part(a0: vec2<f32>, a1: vec2<f32>, b0: vec2<f32>, b1: vec2<f32>, bound
         && (s > bound || t < -bound) && (u > bound || w < -bound);
 }
 
-// Whether the triangles v, a and v, b certainly meet in v alone, because seen along a coordinate axis they share no ray.
+// Whether the triangles v, a and v, b certainly meet in v alone, because seen along a coordinate
+// axis they share no ray.
 fn angles_apart(v: vec3<f32>, a0: vec3<f32>, a1: vec3<f32>, b0: vec3<f32>, b1: vec3<f32>, slack: f32) -> bool {
     let p0 = a0 - v;
     let p1 = a1 - v;
@@ -98,8 +101,8 @@ fn sides_part(edge: vec2<f32>, p: vec2<f32>, q: vec2<f32>, bound: f32) -> bool {
     return (of_p > bound && of_q < -bound) || (of_p < -bound && of_q > bound);
 }
 
-// Whether the triangles u, v, p and u, v, q certainly share the edge uv and nothing else, because seen along a coordinate
-// axis p and q lie on different sides of it.
+// Whether the triangles u, v, p and u, v, q certainly share the edge uv and nothing else, because
+// seen along a coordinate axis p and q lie on different sides of it.
 fn sides_apart(u: vec3<f32>, v: vec3<f32>, p: vec3<f32>, q: vec3<f32>, slack: f32) -> bool {
     let edge = v - u;
     let to_p = p - u;

@@ -1,5 +1,5 @@
-// The region of a frame as floats: keys are clamped to magnitudes of at most 2^120, where differences
-// cannot overflow, and turned back into floats. This keeps their order.
+// The region of a frame as floats: keys are clamped to magnitudes of at most 2^120, where
+// differences cannot overflow, and turned back into floats. This keeps their order.
 
 const KEY_LOWEST: u32 = 0x047fffffu; // of -2^120
 const KEY_HIGHEST: u32 = 0xfb800000u; // of 2^120

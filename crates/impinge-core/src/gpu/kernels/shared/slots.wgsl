@@ -1,5 +1,5 @@
-// The slot of an invocation's entry in a list, if it has one: one entry of the counter per workgroup. All invocations of a workgroup
-// call it together.
+// The slot of an invocation's entry in a list, if it has one: one entry of the counter per
+// workgroup. All invocations of a workgroup call it together.
 var<workgroup> n_entries: atomic<u32>;
 var<workgroup> first_slot: u32;
 

@@ -1,4 +1,5 @@
-// A tetrahedron against a tetrahedron or a triangle, in the same steps as `impinge_exact::filter` on the CPU.
+// A tetrahedron against a tetrahedron or a triangle, in the same steps as `impinge_exact::filter`
+// on the CPU.
 //
 // A solid is four points. A triangle repeats its last point and has one face and three edges.
 //
@@ -11,14 +12,14 @@ struct Solid {
     is_triangle: bool,
 }
 
-// Where the points of one solid lie relative to each face of the other: 1 inside, -1 outside, 0 unsure.
-// If the other is a triangle: 1 above, -1 below, 0 unsure.
+// Where the points of one solid lie relative to each face of the other: 1 inside, -1 outside, 0
+// unsure. If the other is a triangle: 1 above, -1 below, 0 unsure.
 struct Sides {
     faces: array<vec4<i32>, 4>,
 }
 
-// The vertices of face k of a tetrahedron, counterclockwise as seen from vertex k if the tetrahedron is
-// positively oriented.
+// The vertices of face k of a tetrahedron, counterclockwise as seen from vertex k if the
+// tetrahedron is positively oriented.
 fn face(k: u32) -> vec3<u32> {
     switch k {
         case 0u: { return vec3<u32>(1u, 3u, 2u); }

@@ -1,5 +1,5 @@
-// Triangle against triangle, in the same steps as `impinge_exact::filter` on the CPU: planes first, then the
-// two edge-edge determinants of Guigue and Devillers (2003), then projections.
+// Triangle against triangle, in the same steps as `impinge_exact::filter` on the CPU: planes first,
+// then the two edge-edge determinants of Guigue and Devillers (2003), then projections.
 
 const YES: i32 = 1;
 const NO: i32 = -1;
@@ -9,8 +9,8 @@ fn all_are(signs: vec3<i32>, sign: i32) -> bool {
     return all(signs == vec3<i32>(sign));
 }
 
-// The triangle with its vertices rotated so that the one alone on its side comes first; the other two may be
-// exchanged.
+// The triangle with its vertices rotated so that the one alone on its side comes first; the other
+// two may be exchanged.
 struct Turned {
     p: vec3<f32>,
     q: vec3<f32>,
@@ -38,8 +38,8 @@ fn turned(p: vec3<f32>, q: vec3<f32>, r: vec3<f32>, first: u32, exchange: bool) 
     return t;
 }
 
-// Along the line where the planes meet, a covers the interval from edge 02 to edge 01, and b from 01
-// to 02 (exchanged as needed). They meet unless one interval begins after the other has ended:
+// Along the line where the planes meet, a covers the interval from edge 02 to edge 01, and b from
+// 01 to 02 (exchanged as needed). They meet unless one interval begins after the other has ended:
 //
 //        a0
 //       /  \
