@@ -248,7 +248,7 @@ pub(crate) struct RawBoundsArray {
 
 // SAFETY: a pointer does nothing by itself; the contract of `put` covers its use.
 unsafe impl Send for RawBoundsArray {}
-// SAFETY: as above.
+// SAFETY: a shared copy gives no access to memory but by `put`, whose contract covers it.
 unsafe impl Sync for RawBoundsArray {}
 
 impl RawBoundsArray {

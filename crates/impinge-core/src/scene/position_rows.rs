@@ -32,7 +32,7 @@ struct SharedRows<R> {
 // SAFETY: a `SharedRows` is used like a reference to its rows, which may be sent if `R` is `Sync`.
 // The owner is `Send` and `Sync`.
 unsafe impl<R: Sync> Send for SharedRows<R> {}
-// SAFETY: as above.
+// SAFETY: only shared references to the rows are handed out, and `R` is `Sync`; so is the owner.
 unsafe impl<R: Sync> Sync for SharedRows<R> {}
 
 impl<R: Copy> PositionRows<R> {

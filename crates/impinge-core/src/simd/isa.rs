@@ -95,7 +95,7 @@ macro_rules! with_isa {
             // SAFETY: an `Isa` is only ever one that `Isa::detect` found on this processor.
             #[cfg(target_arch = "x86_64")]
             $crate::simd::Isa::Avx2 => unsafe { avx2($($value),*) },
-            // SAFETY: as above.
+            // SAFETY: `Isa::detect` gives `Avx512` only where the processor has these features.
             #[cfg(target_arch = "x86_64")]
             $crate::simd::Isa::Avx512 => unsafe { avx512($($value),*) },
         }

@@ -40,7 +40,8 @@ const REGION: u64 = 1 << 32;
 // SAFETY: only the one caller that has set `busy` writes `work`, while the gate is closed and no
 // helper is inside; only helpers that entered an open gate read it.
 unsafe impl Send for Crew {}
-// SAFETY: as above.
+// SAFETY: helpers only read `work`, and only inside; `busy` admits one caller, which writes it only
+// while the gate is closed and no helper is inside. All other fields are `Sync`.
 unsafe impl Sync for Crew {}
 
 /// A value of the gate that a helper has seen.
@@ -132,7 +133,8 @@ impl Crew {
         // SAFETY: the helper is inside, so the caller waits for it and the work is alive.
         let work = self.work.with(|slot| unsafe { *slot });
         if let Some(work) = work {
-            // SAFETY: as above.
+            // SAFETY: the caller closes the region only when no helper is inside; until then the
+            // closure and all that it borrows live.
             let run = AssertUnwindSafe(|| unsafe { (*work)(seat) });
             if let Err(payload) = catch_unwind(run) {
                 *self.panic.lock().unwrap_or_else(PoisonError::into_inner) = Some(payload);

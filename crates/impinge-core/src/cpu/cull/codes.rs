@@ -37,7 +37,7 @@ pub(crate) struct Codes {
 
 // SAFETY: a pointer does nothing by itself; the contract of `put` covers its use.
 unsafe impl Send for Codes {}
-// SAFETY: as above.
+// SAFETY: a shared copy gives no access to memory but by `put`, whose contract covers it.
 unsafe impl Sync for Codes {}
 
 /// Vertices whose coordinates are processed at once, as one row of floats.

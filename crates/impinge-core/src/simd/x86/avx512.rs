@@ -210,7 +210,8 @@ impl Simd for Avx512 {
         [query_start, query_end]: &[Aabb; 2],
         among: u64,
     ) -> u64 {
-        // SAFETY: as above.
+        // SAFETY: `Avx512` exists only where the processor has it; sixteen lanes of 64 are read
+        // from rows that are aligned to 64 bytes.
         unsafe {
             let low_start = splat_512(&query_start.min);
             let low_end = splat_512(&query_end.min);
@@ -390,7 +391,8 @@ impl Simd for Avx512 {
 
     #[inline(always)]
     fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64 {
-        // SAFETY: as above, lane for lane.
+        // SAFETY: `Avx512` exists only where the processor has it; sixteen lanes of 64 are read
+        // from an array that is aligned to 64 bytes.
         unsafe {
             let query = _mm512_set1_epi32(query as i32);
             let mut mask = 0u64;

@@ -418,7 +418,8 @@ impl Simd for Avx2 {
             if (among >> (8 * chunk)) & 0xff == 0 {
                 continue;
             }
-            // SAFETY: as above.
+            // SAFETY: `Avx2` exists only where the processor has it; eight lanes of 64 are read
+            // from rows that are aligned to 64 bytes.
             unsafe {
                 let load = |row: &[f32; GROUP]| _mm256_load_ps(row.as_ptr().add(8 * chunk));
                 let mut all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
@@ -447,7 +448,8 @@ impl Simd for Avx2 {
 
     #[inline(always)]
     fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64 {
-        // SAFETY: as above, lane for lane.
+        // SAFETY: `Avx2` exists only where the processor has it; eight lanes of 64 are read from an
+        // array that is aligned to 64 bytes.
         unsafe {
             let query = _mm256_set1_epi32(query as i32);
             let mut mask = 0u64;
