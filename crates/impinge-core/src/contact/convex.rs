@@ -30,6 +30,49 @@ pub struct ConvexOverlap {
     pub vertex: usize,
 }
 
+/// The convex hull of some differences.
+struct Polyhedron {
+    points: Vec<Point>,
+    faces: Vec<Face>,
+}
+
+impl Polyhedron {
+    /// The hull of a tetrahedron that turns outwards.
+    fn new(corners: [Point; 4]) -> Self {
+        let faces = [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
+        Polyhedron {
+            points: corners.to_vec(),
+            faces: faces.map(|of| face(&corners, of)).to_vec(),
+        }
+    }
+
+    /// Whether a point is beyond a face.
+    fn is_seen(&self, face: &Face, point: &Point) -> bool {
+        let [p, q, r] = face.corners.map(|ix| self.points[ix]);
+        orient3d(&p, &q, &r, point) == Sign::Negative
+    }
+
+    /// Grows to a point: the faces that it sees give way to one for each side of their border.
+    fn add(&mut self, point: Point) {
+        let faces = std::mem::take(&mut self.faces).into_iter();
+        let (seen, kept): (Vec<Face>, _) = faces.partition(|face| self.is_seen(face, &point));
+        self.faces = kept;
+        let sides = |face: &Face| {
+            let [p, q, r] = face.corners;
+            [[p, q], [q, r], [r, p]]
+        };
+        let inner: Vec<[usize; 2]> = seen.iter().flat_map(sides).collect();
+        let new = self.points.len();
+        self.points.push(point);
+        for &[p, q] in &inner {
+            // Else both faces of the side are seen.
+            if !inner.contains(&[q, p]) {
+                self.faces.push(face(&self.points, [p, q, new]));
+            }
+        }
+    }
+}
+
 /// A face of the polyhedron, seen from outside counter-clockwise.
 #[derive(Clone, Copy)]
 struct Face {
@@ -54,16 +97,6 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
     let scale = Scale::of_points(a.iter().chain(b).map(|&point| sub(point, origin)));
     let read = |points: &[Point]| points.iter().map(|&point| scale.point(point)).collect();
     let [a, b]: [Vec<Point>; 2] = [read(a), read(b)];
-    let farthest = |points: &[Point], way: Point| {
-        let (mut best, mut most) = (None, f64::NEG_INFINITY);
-        for (ix, &point) in points.iter().enumerate() {
-            let height = dot(point, way);
-            if height > most {
-                (best, most) = (Some(ix), height);
-            }
-        }
-        best
-    };
     let support = |way: Point| -> Option<Point> {
         let (i, j) = (farthest(&a, way)?, farthest(&b, scaled(way, -1.0))?);
         Some(sub(a[i], b[j]))
@@ -79,18 +112,13 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
         .iter()
         .fold(0.0f64, |most, x| most.max(x.abs()));
     let noise = ROUNDING * size;
-    let mut points = first_corners(&a, &b, &ends)?.to_vec();
-    let mut faces: Vec<Face> = Vec::new();
-    for corners in [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]] {
-        faces.push(face(&points, corners));
-    }
+    let mut polyhedron = Polyhedron::new(first_corners(&a, &b, &ends)?);
     let mut best: Option<(f64, Point)> = None;
     // Faces that were found to be faces of the whole.
     let mut is_final: Vec<[usize; 3]> = Vec::new();
     loop {
-        let open = faces
-            .iter()
-            .filter(|face| !is_final.contains(&face.corners));
+        let open = polyhedron.faces.iter();
+        let open = open.filter(|face| !is_final.contains(&face.corners));
         let Some(&nearest) = open.min_by(|x, y| x.height.total_cmp(&y.height)) else {
             break;
         };
@@ -100,13 +128,9 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
         }
         let point = support(nearest.normal)?;
         let reached = dot(point, nearest.normal);
-        let sees = |face: &Face| {
-            let [p, q, r] = face.corners.map(|ix| points[ix]);
-            orient3d(&p, &q, &r, &point) == Sign::Negative
-        };
         // The normal of a narrow face may be so wrong that it does not see its own farthest point.
         let is_near = reached - nearest.height <= noise;
-        if is_near || points.len() >= MOST || !sees(&nearest) {
+        if is_near || polyhedron.points.len() >= MOST || !polyhedron.is_seen(&nearest, &point) {
             let is_lower = |(height, normal): (f64, Point)| {
                 reached < height - noise
                     || (reached <= height + noise && rounded(nearest.normal) < rounded(normal))
@@ -117,21 +141,7 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
             is_final.push(nearest.corners);
             continue;
         }
-        // The border of what the new point sees: sides whose other face stays.
-        let seen: Vec<Face> = faces.iter().copied().filter(sees).collect();
-        let sides = |face: &Face| {
-            let [p, q, r] = face.corners;
-            [[p, q], [q, r], [r, p]]
-        };
-        let inner: Vec<[usize; 2]> = seen.iter().flat_map(sides).collect();
-        faces.retain(|face| !sees(face));
-        let new = points.len();
-        points.push(point);
-        for &[p, q] in &inner {
-            if !inner.contains(&[q, p]) {
-                faces.push(face(&points, [p, q, new]));
-            }
-        }
+        polyhedron.add(point);
     }
     let (height, normal) = best.filter(|&(_, normal)| normal != [0.0; 3])?;
     Some(ConvexOverlap {
@@ -139,6 +149,18 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
         normal,
         vertex: farthest_of_tied(&a, normal, noise)?,
     })
+}
+
+/// The first of the points that are farthest along a way.
+fn farthest(points: &[Point], way: Point) -> Option<usize> {
+    let (mut best, mut most) = (None, f64::NEG_INFINITY);
+    for (ix, &point) in points.iter().enumerate() {
+        let height = dot(point, way);
+        if height > most {
+            (best, most) = (Some(ix), height);
+        }
+    }
+    best
 }
 
 /// The lowest of the points that are farthest along a way, but for rounding.

@@ -375,23 +375,8 @@ impl Engine {
             if n_vertices == 0 {
                 continue;
             }
-            let storage = wgpu::BufferUsages::STORAGE;
-            let of_caller = |label, buffer: &wgpu::Buffer| {
-                check_holds(body, buffer, label, n_vertices, (storage, "STORAGE"))?;
-                let bytes = 12 * n_vertices;
-                if bytes > self.gpu.max_binding() {
-                    let most = self.gpu.max_binding();
-                    return Err(refused(&format!(
-                        "its {label} take {bytes} bytes, and the device binds at most {most}"
-                    )));
-                }
-                let buffer = buffer.clone();
-                Ok(Slice {
-                    label,
-                    buffer,
-                    bytes,
-                })
-            };
+            let most = self.gpu.max_binding();
+            let of_caller = |label, buffer| positions_in(body, buffer, label, n_vertices, most);
             let shares = Slice {
                 label: "safe distances",
                 buffer: safe.distances.clone(),
@@ -584,6 +569,31 @@ fn check_holds(
         });
     }
     Ok(())
+}
+
+/// The positions in a buffer that the caller gave, of which the device binds so many bytes at most.
+fn positions_in(
+    body: BodyId,
+    buffer: &wgpu::Buffer,
+    label: &'static str,
+    n_vertices: u64,
+    most: u64,
+) -> Result<Slice, Error> {
+    let storage = (wgpu::BufferUsages::STORAGE, "STORAGE");
+    check_holds(body, buffer, label, n_vertices, storage)?;
+    let bytes = 12 * n_vertices;
+    if bytes > most {
+        return Err(Error::Gpu {
+            what: format!(
+                "body {body}: its {label} take {bytes} bytes, and the device binds at most {most}"
+            ),
+        });
+    }
+    Ok(Slice {
+        label,
+        buffer: buffer.clone(),
+        bytes,
+    })
 }
 
 /// The numbers of all parts.

@@ -313,17 +313,30 @@ fn pair<S: Simd>(
         let corners = [&a.corners[..a.n_corners], &b.corners[..b.n_corners]];
         lane_pairs.drop_sharing(simd, corners);
     }
+    drop_unasked(world, item, [a, b], known.is_some(), lane_pairs);
+    (lane_pairs.len() > 0).then_some(slots)
+}
+
+/// Drops candidates of which no vertex has moved, where that counts, and those that the query
+/// leaves out: if others are excluded already, only those of marked vertices.
+#[inline(always)]
+fn drop_unasked(
+    world: StepWorld<'_>,
+    item: &WorkItem,
+    groups: [&StepGroup; 2],
+    only_marked: bool,
+    lane_pairs: &mut LanePairs,
+) {
     if let Some([of_a, of_b]) = world.moved(item) {
         lane_pairs.retain(|[a, b]| (of_a >> a | of_b >> b) & 1 == 1);
     }
-    let leaves_out = match known {
-        Some(_) => world.plan.leaves_out_marked(),
-        None => world.plan.leaves_out_between(item.a, item.b),
+    let leaves_out = match only_marked {
+        true => world.plan.leaves_out_marked(),
+        false => world.plan.leaves_out_between(item.a, item.b),
     };
     if leaves_out {
-        lane_pairs.retain(|lanes| !is_left_out(world, item, [a, b], lanes, known.is_some()));
+        lane_pairs.retain(|lanes| !is_left_out(world, item, groups, lanes, only_marked));
     }
-    (lane_pairs.len() > 0).then_some(slots)
 }
 
 /// By how much farther the boxes of two parts reach together than elements are apart that count: of

@@ -43,9 +43,11 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Step
     let sides = PairSides::new(world, between);
     let mut steps = Steps8::default();
     let mut spans = Spans8::default();
-    let mut open = std::mem::take(&mut contacts.open);
-    let mut later = std::mem::take(&mut contacts.later);
-    let mut single = std::mem::take(&mut contacts.single);
+    let mut lists = PassLists {
+        open: std::mem::take(&mut contacts.open),
+        later: std::mem::take(&mut contacts.later),
+        single: std::mem::take(&mut contacts.single),
+    };
     let margin = contacts.margin(world, between);
     let after_first = if margin > 0.0 {
         Pass::Close
@@ -58,10 +60,7 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Step
         after_first
     };
     loop {
-        let mut waiting = std::mem::take(match pass {
-            Pass::Enclose => &mut single,
-            _ => &mut open,
-        });
+        let mut waiting = lists.take(pass);
         for chunk in waiting.chunks(LANES) {
             sides.fill(simd, chunk, &mut steps, &mut spans);
             let among = u8::MAX >> (LANES - chunk.len());
@@ -70,54 +69,82 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Step
                     let until = contacts.until(world);
                     let no = filter::are_apart::<S::F64>(pair, &steps, until, margin);
                     for lane in Lanes(u64::from(!no & among)) {
-                        later.push(chunk[lane]);
+                        lists.later.push(chunk[lane]);
                     }
                 }
                 Pass::Close | Pass::Look => {
                     let is_close = pass == Pass::Close;
                     let margin = if is_close { margin } else { 0.0 };
                     let seen = filter::look::<S::F64>(pair, &steps, &spans, margin);
-                    let lists = (&mut later, &mut single);
+                    let into = (&mut lists.later, &mut lists.single);
                     if is_close {
-                        contacts.keep_close(world, between, chunk, &seen, lists);
+                        contacts.keep_close(world, between, chunk, &seen, into);
                     } else {
-                        contacts.after_look(world, (between, pair), chunk, among, &seen, lists);
+                        contacts.after_look(world, (between, pair), chunk, among, &seen, into);
                     }
                 }
                 Pass::Enclose => {
                     let found = filter::enclose::<S::F64>(pair, &steps, &spans);
-                    contacts.after_enclosing(world, (between, pair), chunk, &found, &mut later);
+                    let later = &mut lists.later;
+                    contacts.after_enclosing(world, (between, pair), chunk, &found, later);
                 }
             }
         }
         waiting.clear();
+        match lists.after(pass, waiting, after_first) {
+            Some(next) => pass = next,
+            None => break,
+        }
+    }
+    (contacts.open, contacts.later, contacts.single) = (lists.open, lists.later, lists.single);
+}
+
+/// The pairs that passes take, and leave to others.
+struct PassLists {
+    /// For the next pass, unless it encloses.
+    open: Vec<Open>,
+    /// What the current pass has left open.
+    later: Vec<Open>,
+    /// Candidates that are to be enclosed.
+    single: Vec<Open>,
+}
+
+impl PassLists {
+    /// Takes the pairs of a pass.
+    #[inline(always)]
+    fn take(&mut self, pass: Pass) -> Vec<Open> {
+        std::mem::take(match pass {
+            Pass::Enclose => &mut self.single,
+            _ => &mut self.open,
+        })
+    }
+
+    /// The pass after another one, whose list is handed back empty; `None` if nothing is open.
+    #[inline(always)]
+    fn after(&mut self, pass: Pass, empty: Vec<Open>, after_first: Pass) -> Option<Pass> {
         match pass {
-            Pass::First => {
-                (open, later) = (later, waiting);
-                pass = after_first;
-            }
-            Pass::Close => {
-                (open, later) = (later, waiting);
-                if open.is_empty() {
-                    std::mem::swap(&mut open, &mut single);
-                    pass = Pass::Look;
+            Pass::First | Pass::Close => {
+                self.open = std::mem::replace(&mut self.later, empty);
+                if pass == Pass::First {
+                    return Some(after_first);
                 }
+                if !self.open.is_empty() {
+                    return Some(Pass::Close);
+                }
+                std::mem::swap(&mut self.open, &mut self.single);
+                Some(Pass::Look)
             }
             Pass::Look => {
-                open = waiting;
-                pass = Pass::Enclose;
+                self.open = empty;
+                Some(Pass::Enclose)
             }
             Pass::Enclose => {
-                single = waiting;
-                std::mem::swap(&mut open, &mut later);
-                if open.is_empty() {
-                    break;
-                }
-                pass = Pass::Look;
+                self.single = empty;
+                std::mem::swap(&mut self.open, &mut self.later);
+                (!self.open.is_empty()).then_some(Pass::Look)
             }
         }
     }
-    (contacts.open, contacts.later, contacts.single) = (open, later, single);
 }
 
 impl FirstContacts {
