@@ -36,6 +36,7 @@
 mod build;
 mod convex;
 mod coordinates;
+mod crossings;
 mod curves;
 mod depths;
 mod double;

@@ -29,6 +29,7 @@ mod resident;
 mod seeds;
 mod top_level;
 mod topology;
+mod uploads;
 pub mod view;
 mod waiting;
 pub mod world;

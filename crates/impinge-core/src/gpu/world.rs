@@ -28,11 +28,10 @@
 //! Parts are sent once; each frame sends the positions that have changed. What the queue is given
 //! to write runs before all commands of the next submission. So where commands that may not have
 //! run yet write positions of a body, the scene's positions go there by a command too, and later
-//! questions do not take them for what the device holds: see `LastWrite` and `Encoded`.
+//! questions do not take them for what the device holds: see `uploads`.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::Arc;
 
 use crate::bvh::clusters::Clustering;
 use crate::bvh::tree::TreeShape;
@@ -41,7 +40,6 @@ use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{Number, PartIx};
-use crate::scene::positions::Positions;
 use crate::search::runner::Job;
 use crate::search::stats::Stats;
 use crate::workers::Workers;
@@ -53,78 +51,12 @@ use super::layout::{
 use super::open::GpuContext;
 use super::pieces::{Chunk, Loaded};
 use super::top_level::Trees;
-use super::topology::{DeviceClusters, Most, Weight, narrowed};
+use super::topology::{DeviceClusters, Most, Weight};
+use super::uploads::{Encoded, LastWrite, Resident, VERTEX, fill, positions, stamp};
 use super::view::{Motion, SLACK, View};
 
 /// Bit 31 of a slot is a flag.
 pub const MOST_ELEMENTS: u64 = 1 << 31;
-/// Vertices whose positions a task sends.
-const SENT_BY_A_TASK: u64 = 1 << 14;
-/// Bytes of a vertex.
-const VERTEX: u64 = 3 * size_of::<Coordinate>() as u64;
-
-/// A body whose positions are on the device.
-#[derive(Debug)]
-struct Resident {
-    id: BodyId,
-    topology_stamp: u64,
-    /// Index of its first vertex among those of one end.
-    first_vertex: u64,
-    n_vertices: u64,
-    /// Its positions at the start, and at the end.
-    written: [LastWrite; 2],
-}
-
-/// What was written last where a body's positions are, at one end.
-#[derive(Debug, Clone, Copy, Default)]
-struct LastWrite {
-    /// The stamp of the scene's positions; 0 for those of a buffer of the caller's.
-    stamp: u64,
-    /// The last encoding that writes here, if there was one since the queue certainly wrote last.
-    encoding: Option<u64>,
-    /// Whether that encoding has written last, and not the queue.
-    is_encoded: bool,
-}
-
-/// Encodings for the caller, who may submit them later, or never. While the commands of one may
-/// still run, they may write positions and boxes after whatever the queue has been given.
-#[derive(Debug, Default)]
-struct Encoded {
-    n: u64,
-    /// The number of each, and what its commands hold until they have run or are dropped.
-    pending: Vec<(u64, Weak<()>)>,
-}
-
-impl Encoded {
-    /// The number of a new encoding.
-    fn begin(&mut self, encoder: &wgpu::CommandEncoder) -> u64 {
-        let held = Arc::new(());
-        self.n += 1;
-        self.pending.push((self.n, Arc::downgrade(&held)));
-        encoder.on_submitted_work_done(move || drop(held));
-        self.n
-    }
-
-    /// The least number of those that may still run.
-    fn oldest(&mut self) -> Option<u64> {
-        self.pending.retain(|(_, held)| held.strong_count() > 0);
-        self.pending.first().map(|&(number, _)| number)
-    }
-
-    /// Whether one may still run.
-    fn may_run(&self, number: u64) -> bool {
-        let pending = &mut self.pending.iter();
-        pending.any(|(own, held)| *own == number && held.strong_count() > 0)
-    }
-}
-
-impl Resident {
-    /// Its vertices among those of one end.
-    fn vertices(&self) -> Range<u64> {
-        self.first_vertex..self.first_vertex + self.n_vertices
-    }
-}
-
 /// A part of a body on the device.
 #[derive(Debug, Clone)]
 pub(super) struct HeldPart {
@@ -608,49 +540,6 @@ impl DeviceWorld {
     }
 }
 
-impl LastWrite {
-    /// Whether commands that were encoded, the oldest of those that may still run being this one,
-    /// may write here.
-    fn may_be_overwritten(&self, oldest: Option<u64>) -> bool {
-        (self.encoding.zip(oldest)).is_some_and(|(encoding, oldest)| oldest <= encoding)
-    }
-
-    /// Says that the queue writes positions of the scene.
-    fn by_queue(&mut self, stamp: u64, oldest: Option<u64>) {
-        let encoding = self.encoding.filter(|_| self.may_be_overwritten(oldest));
-        *self = LastWrite {
-            stamp,
-            encoding,
-            is_encoded: false,
-        };
-    }
-
-    /// Says that commands write positions.
-    fn by_encoding(&mut self, stamp: u64, number: u64) {
-        *self = LastWrite {
-            stamp,
-            encoding: Some(number),
-            is_encoded: true,
-        };
-    }
-}
-
-/// The stamp of a body's positions at one end.
-fn stamp(scene: &Scene, body: &Resident, end: u64) -> u64 {
-    let body = scene.body_in(body.id.slot());
-    [body.positions_stamp(), body.step_stamp()][end as usize]
-}
-
-/// A body's positions at one end. Without positions at the end, it stays where it is.
-fn positions<'a>(scene: &'a Scene, body: &Resident, end: u64) -> &'a Positions {
-    let body = scene.body_in(body.id.slot());
-    let start = body.positions();
-    match end {
-        0 => start,
-        _ => body.end_positions().unwrap_or(start),
-    }
-}
-
 /// The parts of a step, then those of a frame that are none of them.
 fn union([still, moving]: &[Vec<HeldPart>; 2]) -> Vec<HeldPart> {
     let mut parts = moving.clone();
@@ -674,67 +563,6 @@ fn ids(parts: &[HeldPart]) -> Vec<BodyId> {
 
 fn key(part: &HeldPart) -> (BodyId, *const Clustering) {
     (part.id, Arc::as_ptr(&part.clustering))
-}
-
-/// A part of what is sent, for one of the threads.
-struct Sent<'a>(wgpu::WriteOnly<'a, [u8]>);
-
-// SAFETY: a `WriteOnly<T>` is `Send` where `T` is, but wgpu says so of sized types alone. It is
-// like a mutable reference, and bytes may be sent.
-unsafe impl Send for Sent<'_> {}
-
-/// Writes the positions of consecutive bodies as the device has them, on all threads.
-fn fill<'a>(
-    mut to: wgpu::WriteOnly<'_, [u8]>,
-    run: &[Resident],
-    positions: impl Fn(&Resident) -> &'a Positions + Sync,
-    workers: &Workers,
-) {
-    let size = SENT_BY_A_TASK * VERTEX;
-    let mut tasks = Vec::new();
-    while let Some(part) = to.split_off(..to.len().min(size as usize))
-        && !part.is_empty()
-    {
-        tasks.push(Mutex::new(Some(Sent(part))));
-    }
-    workers.for_each(&mut vec![(); workers.n()], tasks.len(), |(), ix| {
-        let part = tasks[ix]
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .take();
-        let Some(Sent(mut to)) = part else { return };
-        let start = run[0].first_vertex + count(ix) * SENT_BY_A_TASK;
-        let end = start + count(to.len()) / VERTEX;
-        let first = run.partition_point(|body| body.vertices().end <= start);
-        for body in &run[first..] {
-            let vertices = body.vertices();
-            if vertices.start >= end {
-                break;
-            }
-            let (from, until) = (vertices.start.max(start), vertices.end.min(end));
-            // A body without vertices ends no run.
-            if from >= until {
-                continue;
-            }
-            let own = [from, until].map(|vertex| (vertex - vertices.start) as usize);
-            let bytes = (until - from) * VERTEX;
-            let Some(to) = to.split_off(..bytes as usize) else {
-                break;
-            };
-            put(positions(body), own[0]..own[1], to);
-        }
-    });
-}
-
-/// Writes coordinates as the device has them.
-fn put(positions: &Positions, vertices: Range<usize>, mut to: wgpu::WriteOnly<'_, [u8]>) {
-    match positions {
-        Positions::F32(positions) => to.copy_from_slice(bytemuck::cast_slice(&positions[vertices])),
-        Positions::F64(positions) => {
-            let words = positions[vertices].as_flattened().iter().map(narrowed);
-            to.into_chunks().0.write_iter(words.map(u32::to_ne_bytes));
-        }
-    }
 }
 
 /// A point of a body: the first corner of its first element. The tree over parts is built from

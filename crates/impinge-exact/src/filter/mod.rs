@@ -28,6 +28,7 @@ mod determinant;
 mod directions;
 pub(super) mod motion;
 mod moving;
+mod near_tables;
 pub(super) mod nearness;
 mod neighbours;
 pub mod number;
@@ -47,8 +48,8 @@ pub use moving::{
 };
 pub(super) use moving::{contact_answer, search_contact};
 #[cfg(test)]
-pub use nearness::Near16;
-pub use nearness::{
+pub use near_tables::Near16;
+pub use near_tables::{
     Bounded16, SWAPPED_PARTS, are_within_in_tables, bounded_in_tables, bounds_and_parts,
     distance_bounds, nearest_in_tables, point_bounds_in_tables, stay_beyond_in_tables,
 };
