@@ -55,9 +55,8 @@ pub use impinge_exact as exact;
 pub use impinge_weld::{Coordinate, Weld, WrongNumber};
 pub use query::pair_kind::{PairKind, PairKinds};
 pub use query::progress::{CancelToken, Control, Progress};
-pub use query::settings::{Affinity, Backend, InstructionSet, Method, Recluster, Settings};
+pub use query::settings::{Backend, InstructionSet, Method, Recluster, Settings};
 pub use query::step::{Clearance, ElementVertices, Hit, PairFilter, Precision, Start};
-pub use query::tuning::{Tuning, Ways};
 pub use query::{Exclusion, Query, SharedVertex};
 pub use scene::elements::{BodyKind, Elements, Part};
 pub use scene::error::Error;
@@ -69,3 +68,5 @@ pub use scene::{Body, Filter, Scene, Thickness};
 pub use search::stats::{Stage, Stats};
 #[cfg(feature = "gpu")]
 pub use wgpu;
+pub use workers::affinity::Affinity;
+pub use workers::tuning::{Tuning, Ways};

@@ -6,11 +6,11 @@ use crate::boxes;
 use crate::bvh::bounds::Aabb;
 #[cfg(feature = "gpu")]
 use crate::bvh::clusters::Clustering;
-use crate::query::tuning::Tuning;
 #[cfg(feature = "gpu")]
 use crate::scene::index::ClusterIx;
 #[cfg(feature = "gpu")]
 use crate::scene::positions::Positions;
+use crate::workers::tuning::Tuning;
 
 /// How well clusters have fitted their body at best.
 #[derive(Debug, Clone, Copy)]

@@ -33,7 +33,6 @@ use crate::boxes;
 use crate::bvh::clusters::Clustering;
 use crate::query::progress::{CancelToken, Control};
 use crate::query::settings::{Recluster, Settings};
-use crate::query::tuning::Tuning;
 use crate::scene::elements::{Elements, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -45,6 +44,7 @@ use crate::search::stats::Stats;
 use crate::search::work::Work;
 use crate::workers::Workers;
 use crate::workers::clock::Instant;
+use crate::workers::tuning::Tuning;
 
 use bytes_held::BytesHeld;
 #[cfg(feature = "gpu")]

@@ -256,7 +256,7 @@ fn clusters_that_distance_made_serve_intersections() {
                 Detector::new(Settings {
                     instruction_set,
                     method,
-                    tuning: crate::query::tuning::Tuning {
+                    tuning: crate::workers::tuning::Tuning {
                         auto_from: 0,
                         ..Default::default()
                     },

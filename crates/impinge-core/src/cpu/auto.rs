@@ -10,8 +10,8 @@
 
 use crate::clusterings::Clusterings;
 use crate::plan::Plan;
-use crate::query::tuning::Tuning;
 use crate::scene::Scene;
+use crate::workers::tuning::Tuning;
 
 /// The bodies that were in a frame before.
 #[derive(Debug, Default)]

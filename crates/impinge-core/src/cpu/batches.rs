@@ -9,13 +9,13 @@ use crate::plan::Plan;
 use crate::query::SharedVertex;
 use crate::query::progress::Pieces;
 use crate::query::settings::Settings;
-use crate::query::tuning::Tuning;
 use crate::scene::error::Error;
 use crate::scene::index::{ClusterIx, PartIx};
 use crate::search::runner::Job;
 use crate::search::sink::{Answer, Ending};
 use crate::search::stats::Stats;
 use crate::workers::clock::Instant;
+use crate::workers::tuning::Tuning;
 
 use super::lane_pairs::WorkItem;
 use super::pairing::{self, Worker};

@@ -20,12 +20,12 @@ use crate::bvh::bounds::Aabb;
 use crate::bvh::clusters::Clustering;
 use crate::clusterings::{Clusterings, Fit, spread};
 use crate::query::settings::{InstructionSet, Settings};
-use crate::query::tuning::Tuning;
 use crate::scene::elements::BodyKind;
 use crate::scene::error::Error;
 use crate::scene::positions::Positions;
 use crate::scene::{Body, Scene};
 use crate::search::stats::Stats;
+use crate::workers::tuning::Tuning;
 
 use super::batches::{self, BatchScratch};
 use super::bounds::TreeBounds;

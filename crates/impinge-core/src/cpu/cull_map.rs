@@ -18,9 +18,9 @@ use super::cull::{BoundsTask, Cull};
 use super::top_level::TopLevel;
 use super::traversal::NodePair;
 use super::world::{BodyRef, World};
-use crate::query::tuning::{Tuning, Ways};
 use crate::simd::{Isa, Simd, with_isa};
 use crate::workers::Workers;
+use crate::workers::tuning::{Tuning, Ways};
 
 /// Elements per task.
 const ELEMENTS: usize = 4096;

@@ -13,12 +13,12 @@ use std::time::Duration;
 
 use crate::bvh::GROUP;
 use crate::plan::pair_key;
-use crate::query::tuning::Tuning;
 use crate::scene::elements::Elements;
 use crate::scene::index::{Number, PartIx, Slot};
 use crate::scene::positions::Positions;
 use crate::search::narrow::{intersect, intersect_shared};
 use crate::search::sink::{Answer, BLOCK};
+use crate::workers::tuning::Tuning;
 use impinge_exact::internal::filter::{
     self, BATCH, LANES, TetrahedronPairs8, TrianglePairs8, Verdict, Verdict16,
 };

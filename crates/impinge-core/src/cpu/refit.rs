@@ -15,13 +15,13 @@ use std::sync::{Mutex, PoisonError};
 use crate::bvh::bounds::{Aabb, BoundsArray, RawBoundsArray};
 use crate::clusterings::{BodyPart, Clusterings};
 use crate::query::settings::Settings;
-use crate::query::tuning::Tuning;
 use crate::scene::error::Error;
 use crate::scene::index::PartIx;
 use crate::scene::positions::Positions;
 use crate::search::stats::Stats;
 use crate::search::work::Work;
 use crate::workers::Workers;
+use crate::workers::tuning::Tuning;
 
 use super::bounds::{self, Summary};
 use super::culled::body::Children;

@@ -3,8 +3,8 @@
 use crate::bvh::bounds::Aabb;
 use crate::bvh::tree::{Node, TreeEntry, TreeShape, order};
 use crate::clusterings::Fit;
-use crate::query::tuning::Tuning;
 use crate::scene::index::PartIx;
+use crate::workers::tuning::Tuning;
 
 use super::bounds::TreeBounds;
 use super::traversal::{self, BodyTree, NodePair};

@@ -20,13 +20,13 @@ use crate::cpu::top_level::TopLevel;
 use crate::cpu::traversal::NodePair;
 use crate::plan::Plan;
 use crate::query::settings::Settings;
-use crate::query::tuning::Tuning;
 use crate::scene::error::Error;
 use crate::scene::index::PartIx;
 use crate::scene::vector::dot;
 use crate::scene::{Body, Scene};
 use crate::search::narrow::intersect;
 use crate::simd::{Isa, Simd, with_isa};
+use crate::workers::tuning::Tuning;
 
 use super::axes::Axes;
 use super::tree::{Node, Tree, box_of, corners};

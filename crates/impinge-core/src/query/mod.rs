@@ -7,7 +7,6 @@ pub(crate) mod progress;
 mod scope;
 pub(crate) mod settings;
 pub(crate) mod step;
-pub(crate) mod tuning;
 pub(crate) mod vertex_lists;
 
 pub use scope::*;

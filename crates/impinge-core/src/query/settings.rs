@@ -1,9 +1,10 @@
 //! The settings of a detector.
 
 use crate::query::goal::Limits;
-use crate::query::tuning::Tuning;
 use crate::scene::error::{Error, shown};
 use crate::scene::words::words;
+use crate::workers::affinity::Affinity;
+use crate::workers::tuning::Tuning;
 
 /// How candidates are found. All methods give the same pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -88,28 +89,6 @@ pub enum InstructionSet {
 }
 
 words!("instruction_set", "portable, avx2 or avx512", InstructionSet: [Portable = "portable", Avx2 = "avx2", Avx512 = "avx512"; 3]);
-
-/// Which cores the helper threads of the CPU backend may run on. The answer does not depend on it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[non_exhaustive]
-pub enum Affinity {
-    /// On Linux, with up to 8 threads: every core that the helper was started with, except the one
-    /// on which the calling thread is running. Otherwise as `Inherited`.
-    ///
-    /// The system often wakes a helper on the caller's core, where it runs only after the caller is
-    /// done. A frame then takes as long as with fewer threads.
-    Auto,
-    /// Those that the system chooses: no thread's affinity is ever set. A helper starts with the
-    /// affinity of the thread that asked the first question.
-    ///
-    /// For programs that place threads themselves: ranks of MPI, real-time threads, containers
-    /// whose cores are changed while they run, `taskset` on a running process. `Auto` would
-    /// overwrite what they set for a helper.
-    #[default]
-    Inherited,
-}
-
-words!("affinity", "auto or inherited", Affinity: [Auto = "auto", Inherited = "inherited"; 2]);
 
 /// The settings of a detector: [`Settings::new`] and what differs from it, one call each.
 ///

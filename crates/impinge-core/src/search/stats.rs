@@ -1,7 +1,7 @@
 //! Counts and times of a frame.
 
-use crate::query::tuning::Ways;
 use crate::workers::clock::Instant;
+use crate::workers::tuning::Ways;
 
 /// A word that the program knows. By this name serde does not take it for borrowed from its input.
 type Word = &'static str;

@@ -9,21 +9,44 @@
 //! core's number is read once per region, and if it has changed there is one system call per
 //! helper.
 //!
-//! Helpers run where the system puts them with [`Affinity::Inherited`](crate::Affinity::Inherited),
-//! if there is no such call, if the call fails, or if there are many helpers, for whom a core is
-//! free then.
+//! Helpers run where the system puts them with [`Affinity::Inherited`], if there is no such call,
+//! if the call fails, or if there are many helpers, for whom a core is free then.
+
+use crate::scene::words::words;
 
 #[cfg(target_os = "linux")]
 pub(super) use linux::Places;
 #[cfg(not(target_os = "linux"))]
 pub(super) use other::Places;
 
+/// Which cores the helper threads of the CPU backend may run on. The answer does not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub enum Affinity {
+    /// On Linux, with up to 8 threads: every core that the helper was started with, except the one
+    /// on which the calling thread is running. Otherwise as `Inherited`.
+    ///
+    /// The system often wakes a helper on the caller's core, where it runs only after the caller is
+    /// done. A frame then takes as long as with fewer threads.
+    Auto,
+    /// Those that the system chooses: no thread's affinity is ever set. A helper starts with the
+    /// affinity of the thread that asked the first question.
+    ///
+    /// For programs that place threads themselves: ranks of MPI, real-time threads, containers
+    /// whose cores are changed while they run, `taskset` on a running process. `Auto` would
+    /// overwrite what they set for a helper.
+    #[default]
+    Inherited,
+}
+
+words!("affinity", "auto or inherited", Affinity: [Auto = "auto", Inherited = "inherited"; 2]);
+
 #[cfg(target_os = "linux")]
 mod linux {
     use std::sync::OnceLock;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    use crate::query::settings::Affinity;
+    use crate::workers::affinity::Affinity;
     use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_getcpu, sched_setaffinity};
 
     /// The caller's core, and the helpers' threads.
@@ -152,7 +175,7 @@ mod linux {
 
 #[cfg(not(target_os = "linux"))]
 mod other {
-    use crate::query::settings::Affinity;
+    use crate::workers::affinity::Affinity;
 
     /// Does nothing: cores are not known.
     pub(crate) struct Places;

@@ -13,12 +13,13 @@
 //! A helper that lingers yields to every other thread. Clustering, which rayon parallelises, runs
 //! in a rayon pool.
 
-mod affinity;
+pub(crate) mod affinity;
 pub(crate) mod alone;
 pub(crate) mod clock;
 mod crew;
 pub(crate) mod in_parts;
 mod sync;
+pub(crate) mod tuning;
 
 use crate::scene::words::debug_by_name;
 use crate::workers::clock::Instant;
@@ -27,13 +28,12 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use crate::query::settings::Affinity;
-use crate::query::tuning::{Tuning, Ways};
 use crate::scene::error::Error;
 use crate::workers::alone::alone;
 
-use affinity::Places;
+use affinity::{Affinity, Places};
 use crew::{Claims, Crew};
+use tuning::{Tuning, Ways};
 
 /// How long a helper spins while it waits for the next region; after that it yields between checks.
 const SPIN: Duration = Duration::from_micros(50);

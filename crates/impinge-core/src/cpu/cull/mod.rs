@@ -20,9 +20,9 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use crate::bvh::bounds::Aabb;
 use crate::bvh::grid::Grid;
-use crate::query::tuning::Tuning;
 use crate::scene::elements::with_corners;
 use crate::scene::index::{ElementIx, PartIx};
+use crate::workers::tuning::Tuning;
 
 use super::world::World;
 use codes::{Codes, Function, greater_bytes, lesser_bytes};

@@ -6,10 +6,10 @@ use std::ops::Range;
 use crate::bvh::bounds::Aabb;
 use crate::bvh::clusters::Clustering;
 use crate::cpu::bounds::TreeBounds;
-use crate::query::tuning::Tuning;
 use crate::scene::index::ClusterIx;
 use crate::simd::runs::{Members, RUN};
 use crate::simd::{Lanes, Simd};
+use crate::workers::tuning::Tuning;
 
 use super::extents::{self, Extents, FreeSide, FreeSides, Intervals};
 use super::outlook::Outlook;

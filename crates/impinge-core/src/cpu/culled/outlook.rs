@@ -4,7 +4,7 @@
 use std::ops::RangeInclusive;
 
 use crate::bvh::bounds::{Aabb, greater};
-use crate::query::tuning::Tuning;
+use crate::workers::tuning::Tuning;
 
 use super::extents::FreeSides;
 

@@ -5,10 +5,10 @@ use crate::plan::Plan;
 use crate::query::goal::Goal;
 use crate::query::pair_kind::PairKind;
 use crate::query::step::{Precision, Start};
-use crate::query::tuning::Tuning;
 use crate::search::found::{Found, FoundByKind, StepAnswer};
 use crate::search::sink::BLOCK;
 use crate::simd::Isa;
+use crate::workers::tuning::Tuning;
 use impinge_exact::internal::filter::{Search, time_between};
 use impinge_exact::{Contact, ElementPair};
 

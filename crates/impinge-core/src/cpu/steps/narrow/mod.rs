@@ -23,9 +23,9 @@ mod search;
 mod touching;
 
 use crate::plan::{Plan, Question};
-use crate::query::tuning::Tuning;
 use crate::search::found::StepAnswer;
 use crate::simd::Isa;
+use crate::workers::tuning::Tuning;
 
 use super::world::StepWorld;
 
