@@ -15,9 +15,9 @@
 //! volumes are computed from rounded coordinates in `f64`, in a fixed order.
 //!
 //! ```
-//! use impinge_core::contact::Shape;
-//! use impinge_core::{Backend, Detector, Query, Scene};
-//! # fn main() -> Result<(), impinge_core::Error> {
+//! use impinge::contact::Shape;
+//! use impinge::{Backend, Detector, Query, Scene};
+//! # fn main() -> Result<(), impinge::Error> {
 //! let mut scene = Scene::new();
 //! let floor = [[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
 //! let blade = [[1.0f32, 1.0, -1.0], [2.0, 1.0, -1.0], [1.0, 1.0, 1.0]];
