@@ -351,9 +351,9 @@ impl Stencils {
     ) -> Result<Vec<T>, Error> {
         let n = self.rows.len();
         let column = sink::with_capacity(n, WHAT)?;
-        let column = filled_in_parts(column, n, PART, self.threads, |first, room| {
-            for row in self.rows[first..].iter().take(room.n_left()) {
-                room.put(of(&row.at(&self.points)));
+        let column = filled_in_parts(column, n, PART, self.threads, |first, writer| {
+            for row in self.rows[first..].iter().take(writer.n_missing()) {
+                writer.put(of(&row.at(&self.points)));
             }
         });
         Ok(column.unwrap_or_default())

@@ -61,9 +61,9 @@ pub(crate) fn made_from<A: Sync, B: Copy + Send>(
     make: impl Fn(usize, &A) -> B + Sync,
 ) -> Vec<B> {
     let (made, n) = (Vec::with_capacity(from.len()), from.len());
-    let made = filled_in_parts(made, n, BLOCK, 0, |first, room| {
-        for (ix, from) in (first..).zip(&from[first..]).take(room.n_left()) {
-            room.put(make(ix, from));
+    let made = filled_in_parts(made, n, BLOCK, 0, |first, writer| {
+        for (ix, from) in (first..).zip(&from[first..]).take(writer.n_missing()) {
+            writer.put(make(ix, from));
         }
     });
     made.unwrap_or_default()

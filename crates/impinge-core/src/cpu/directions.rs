@@ -48,9 +48,9 @@ impl Pause {
         passes
     }
 
-    /// Of a work item's pairs directions told so many apart.
+    /// Records how many pairs of a work item directions have separated.
     #[inline(always)]
-    fn told(&mut self, n_parted: usize, n_pairs: usize) {
+    fn record(&mut self, n_parted: usize, n_pairs: usize) {
         self.length = match n_parted * Self::PAYS >= n_pairs {
             true => 0,
             false => (2 * self.length + 1).min(Self::LONGEST),
@@ -190,7 +190,7 @@ impl Directions {
             masks: &mut Masks = masks,
         ) -> u64);
         self.n_parted += n_parted;
-        self.pause.told(n_parted as usize, n_pairs);
+        self.pause.record(n_parted as usize, n_pairs);
         n_parted
     }
 }
@@ -233,7 +233,7 @@ mod tests {
             .filter(|_| {
                 let is_asked = !pause.pass();
                 if is_asked {
-                    pause.told(n_parted, 100);
+                    pause.record(n_parted, 100);
                 }
                 is_asked
             })

@@ -41,9 +41,9 @@ pub struct Candidate {
     pub slot_b: Slot,
 }
 
-/// Room for the candidates that wait: the last work item may add a full group product to those that
-/// are not enough yet.
-pub(super) fn room_to_wait(tuning: &Tuning) -> usize {
+/// How many candidates may wait: the last work item may add a full group product to those that are
+/// not enough yet.
+pub(super) fn waiting_capacity(tuning: &Tuning) -> usize {
     // A test may ask for more than memory holds.
     tuning.decide_from.min(1 << 16) + GROUP * GROUP
 }
@@ -85,7 +85,7 @@ impl Decider {
         self.block = answer.block();
         self.seeks_lowest = answer.seeks_lowest();
         self.keys.clear();
-        let most = room_to_wait(tuning);
+        let most = waiting_capacity(tuning);
         // A block less one, plus the keys of a work item, plus those of the waiting candidates.
         self.keys.reserve_exact(BLOCK + GROUP * GROUP + most);
         self.candidates.clear();

@@ -118,7 +118,7 @@ pub(super) fn find_in_step(
     let gpu = Arc::clone(on_device.gpu());
     let before = stats.clone();
     let found = clusters.run_on_device(job, settings, answer, stats, |clusterings, take, stats| {
-        gpu.block_on(on_device.find_left(job, clusterings, (sought, take), stats))
+        gpu.block_on(on_device.find_undecided(job, clusterings, (sought, take), stats))
     });
     match found {
         Ok(ByDevice::Not) => {}

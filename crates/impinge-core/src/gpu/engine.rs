@@ -274,7 +274,7 @@ impl Engine {
     ///
     /// # Errors
     /// Device errors, a budget too small for the smallest pass, cancellation, those of `take`.
-    pub async fn find_left(
+    pub async fn find_undecided(
         &mut self,
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],

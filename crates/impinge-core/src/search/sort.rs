@@ -151,7 +151,7 @@ impl Sorter {
         let is_worth =
             keys.len() >= self.from.max(n_numbers / 2) && u32::try_from(keys.len()).is_ok();
         let n_parts = workers.n().min(MOST_PARTS);
-        if self.in_place || !is_worth || self.make_room(keys.len(), n_numbers, n_parts).is_err() {
+        if self.in_place || !is_worth || self.reserve(keys.len(), n_numbers, n_parts).is_err() {
             keys.sort_unstable();
             return false;
         }
@@ -199,7 +199,7 @@ impl Sorter {
         (size_of::<u32>() * (counts + self.partners.capacity())) as u64
     }
 
-    fn make_room(&mut self, n_keys: usize, n_numbers: usize, n_parts: usize) -> Result<(), Error> {
+    fn reserve(&mut self, n_keys: usize, n_numbers: usize, n_parts: usize) -> Result<(), Error> {
         const WHAT: &str = "room to sort pairs";
         self.parts.resize_with(n_parts, Vec::new);
         for part in &mut self.parts {

@@ -15,9 +15,9 @@
 use crate::scene::words::words;
 
 #[cfg(target_os = "linux")]
-pub(super) use linux::Places;
+pub(super) use linux::HelperCores;
 #[cfg(not(target_os = "linux"))]
-pub(super) use other::Places;
+pub(super) use other::HelperCores;
 
 /// Which cores the helper threads of the CPU backend may run on. The answer does not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -50,7 +50,7 @@ mod linux {
     use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_getcpu, sched_setaffinity};
 
     /// The caller's core, and the helpers' threads.
-    pub(crate) struct Places {
+    pub(crate) struct HelperCores {
         caller: AtomicUsize,
         helpers: Box<[OnceLock<Helper>]>,
         /// The process of the threads: a forked process has none of them.
@@ -67,13 +67,13 @@ mod linux {
     /// From this many helpers on, they are left alone.
     const MANY: usize = 8;
 
-    impl Places {
+    impl HelperCores {
         pub fn new(n_helpers: usize, affinity: Affinity) -> Self {
             let n = match affinity {
                 Affinity::Auto if n_helpers < MANY => n_helpers,
                 _ => 0,
             };
-            Places {
+            HelperCores {
                 caller: AtomicUsize::new(UNKNOWN),
                 helpers: (0..n).map(|_| OnceLock::new()).collect(),
                 process: std::process::id(),
@@ -144,28 +144,31 @@ mod linux {
         #[test]
         fn helpers_keep_off_the_callers_core() {
             let allowed = sched_getaffinity(None).expect("has a set of cores");
-            let places = Places::new(1, Affinity::Auto);
-            places.caller_is_here();
+            let helper_cores = HelperCores::new(1, Affinity::Auto);
+            helper_cores.caller_is_here();
             let (started, is_started) = mpsc::channel();
             let (end, ended) = mpsc::channel::<()>();
             std::thread::scope(|scope| {
-                let places = &places;
+                let helper_cores = &helper_cores;
                 scope.spawn(move || {
-                    places.helper_is_here(1);
+                    helper_cores.helper_is_here(1);
                     started.send(()).expect("somebody waits");
                     let _ = ended.recv();
                 });
                 is_started.recv().expect("it starts");
-                let helper = places.helpers[0].get().expect("it has said so").thread;
+                let helper = helper_cores.helpers[0]
+                    .get()
+                    .expect("it has said so")
+                    .thread;
                 for _ in 0..2 {
-                    let core = places.caller.load(Ordering::SeqCst);
+                    let core = helper_cores.caller.load(Ordering::SeqCst);
                     let cores = sched_getaffinity(Some(helper)).expect("it lives");
                     assert_eq!(cores.is_set(core), allowed.count() == 1);
                     let mut others = (0..CpuSet::MAX_CPU).filter(|&other| other != core);
                     assert!(others.all(|other| cores.is_set(other) == allowed.is_set(other)));
                     // As if the caller had moved from another core.
-                    places.caller.store(UNKNOWN - 1, Ordering::SeqCst);
-                    places.caller_is_here();
+                    helper_cores.caller.store(UNKNOWN - 1, Ordering::SeqCst);
+                    helper_cores.caller_is_here();
                 }
                 drop(end);
             });
@@ -178,11 +181,11 @@ mod other {
     use crate::workers::affinity::Affinity;
 
     /// Does nothing: cores are not known.
-    pub(crate) struct Places;
+    pub(crate) struct HelperCores;
 
-    impl Places {
+    impl HelperCores {
         pub fn new(_: usize, _: Affinity) -> Self {
-            Places
+            HelperCores
         }
 
         pub fn caller_is_here(&self) {}

@@ -37,16 +37,16 @@ pub(crate) fn in_parts<T: Send>(
     });
 }
 
-/// Room for entries of a list that is being made, in order.
-pub(crate) struct Room<'a, T>(slice::IterMut<'a, MaybeUninit<T>>);
+/// Writes entries of a part of a list, in order.
+pub(crate) struct PartWriter<'a, T>(slice::IterMut<'a, MaybeUninit<T>>);
 
-impl<T> Room<'_, T> {
-    /// How many more there is room for.
-    pub fn n_left(&self) -> usize {
+impl<T> PartWriter<'_, T> {
+    /// How many entries are missing.
+    pub fn n_missing(&self) -> usize {
         self.0.len()
     }
 
-    /// Puts the next entry; nothing if there is no room.
+    /// Writes the next entry; nothing if none is missing.
     #[inline(always)]
     pub fn put(&mut self, entry: T) {
         if let Some(to) = self.0.next() {
@@ -56,28 +56,28 @@ impl<T> Room<'_, T> {
 }
 
 /// A list of `n` entries, for which `list`, an empty one, has the memory. `fill` puts entries into
-/// parts of it, which [`in_parts`] gives it. `None` if it left room somewhere.
+/// parts of it, which [`in_parts`] gives it. `None` if it left a gap.
 pub(crate) fn filled_in_parts<T: Copy + Send>(
     mut list: Vec<T>,
     n: usize,
     size: usize,
     threads: usize,
-    fill: impl Fn(usize, &mut Room<'_, T>) + Sync,
+    fill: impl Fn(usize, &mut PartWriter<'_, T>) + Sync,
 ) -> Option<Vec<T>> {
     list.clear();
     let has_gap = AtomicBool::new(false);
-    let room = &mut list.spare_capacity_mut()[..n];
-    in_parts(room, size, threads, |first, part| {
-        let mut room = Room(part.iter_mut());
-        fill(first, &mut room);
-        if room.n_left() > 0 {
+    let spare = &mut list.spare_capacity_mut()[..n];
+    in_parts(spare, size, threads, |first, part| {
+        let mut writer = PartWriter(part.iter_mut());
+        fill(first, &mut writer);
+        if writer.n_missing() > 0 {
             has_gap.store(true, Ordering::Relaxed);
         }
     });
     if has_gap.into_inner() {
         return None;
     }
-    // SAFETY: the room had `n` entries, and each was written.
+    // SAFETY: the parts have `n` entries, and each was written.
     unsafe { list.set_len(n) };
     Some(list)
 }
@@ -117,11 +117,11 @@ mod tests {
     fn a_list_is_filled_or_it_is_none() {
         in_pool(3, || {
             for gap in 0..42 {
-                let list = filled_in_parts(Vec::with_capacity(50), 40, 8, 0, |first, room| {
-                    let n = room.n_left();
+                let list = filled_in_parts(Vec::with_capacity(50), 40, 8, 0, |first, writer| {
+                    let n = writer.n_missing();
                     (first..first + n)
                         .filter(|&ix| ix != gap)
-                        .for_each(|ix| room.put(ix));
+                        .for_each(|ix| writer.put(ix));
                 });
                 assert_eq!(list.is_none(), gap < 40, "{gap}");
                 assert!(list.is_none_or(|list| list.into_iter().eq(0..40)));

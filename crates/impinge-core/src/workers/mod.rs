@@ -31,7 +31,7 @@ use std::time::Duration;
 use crate::scene::error::Error;
 use crate::workers::alone::alone;
 
-use affinity::{Affinity, Places};
+use affinity::{Affinity, HelperCores};
 use crew::{Claims, Crew};
 use tuning::{Tuning, Ways};
 
@@ -281,7 +281,7 @@ impl Workers {
         }
         // Within a region the calling thread is a helper, or another thread.
         if !self.helpers.crew.is_busy() {
-            self.helpers.places.caller_is_here();
+            self.helpers.cores.caller_is_here();
         }
         let threads = self.threads.get_or_init(|| {
             let start = |seat| {
@@ -322,7 +322,7 @@ struct Helpers {
     crew: Crew,
     /// How long helpers that have nothing to do stay awake.
     linger_ns: AtomicU64,
-    places: Places,
+    cores: HelperCores,
 }
 
 impl Helpers {
@@ -330,7 +330,7 @@ impl Helpers {
         Helpers {
             crew: Crew::new(n),
             linger_ns: AtomicU64::new(0),
-            places: Places::new(n, affinity),
+            cores: HelperCores::new(n, affinity),
         }
     }
 
@@ -342,7 +342,7 @@ impl Helpers {
 
     /// The loop of a helper thread.
     fn serve(&self, seat: usize) {
-        self.places.helper_is_here(seat);
+        self.cores.helper_is_here(seat);
         let mut last_region = 0;
         let mut since = Instant::now();
         let mut looks = 0u32;

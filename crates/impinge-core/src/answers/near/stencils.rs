@@ -15,7 +15,7 @@ use crate::scene::elements::{Elements, Part};
 use crate::scene::error::Error;
 use crate::scene::index::{ElementIx, Number, pair_numbers};
 use crate::search::sink;
-use crate::workers::in_parts::{Room, filled_in_parts};
+use crate::workers::in_parts::{PartWriter, filled_in_parts};
 use impinge_exact::Point;
 use impinge_exact::internal::NearestOfElements;
 
@@ -117,15 +117,15 @@ impl NearIter<'_> {
             numbering: self.numbering(),
         };
         let refused = Mutex::new(None);
-        let rows = filled_in_parts(rows, n, PART, threads, |first, room| {
+        let rows = filled_in_parts(rows, n, PART, threads, |first, writer| {
             let mut reader = Reader {
                 parts,
                 rest,
                 sides: [None, None],
             };
             for (kind, keys, nearest) in self.clone().after(first).runs() {
-                for (&key, &nearest) in keys.iter().zip(nearest).take(room.n_left()) {
-                    if let Err(error) = reader.read(kind, key, nearest, room) {
+                for (&key, &nearest) in keys.iter().zip(nearest).take(writer.n_missing()) {
+                    if let Err(error) = reader.read(kind, key, nearest, writer) {
                         let mut refused = refused.lock().unwrap_or_else(PoisonError::into_inner);
                         if refused.as_ref().is_none_or(|(other, _)| first < *other) {
                             *refused = Some((first, error));
@@ -252,7 +252,7 @@ impl Reader<'_> {
         kind: PairKind,
         key: u64,
         nearest: u8,
-        to: &mut Room<'_, StencilRow>,
+        to: &mut PartWriter<'_, StencilRow>,
     ) -> Result<(), Error> {
         let (parts, mut numbers) = (self.parts, pair_numbers(key));
         // Which corner of which side each vertex is.

@@ -161,7 +161,7 @@ fn decide(
                 pair.touches_by.map(f64::from),
             )
         });
-        contacts.take_left(world.isa, world, Between { a, b, kind }, pairs);
+        contacts.take_undecided(world.isa, world, Between { a, b, kind }, pairs);
     }
     contacts.decide(world.isa, world);
     Ok(())

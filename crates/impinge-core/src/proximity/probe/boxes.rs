@@ -311,15 +311,15 @@ pub(super) fn rounding_of([x, y, z]: [f32; 3]) -> f64 {
     f64::from(largest) * f64::from(f32::EPSILON) + f64::from(f32::MIN_POSITIVE)
 }
 
-/// The way down a tree: siblings that are left to be visited.
+/// The way down a tree: the siblings that wait on each level.
 #[derive(Debug, Default)]
 pub(super) struct Descent {
-    stack: Vec<Left>,
+    stack: Vec<Unvisited>,
 }
 
-/// Of consecutive nodes of one level those whose boxes meet the query and that were not visited.
+/// Consecutive nodes of one level: those whose boxes meet the query and that were not visited.
 #[derive(Debug)]
-struct Left {
+struct Unvisited {
     level: u32,
     first: u32,
     mask: u64,
@@ -330,7 +330,7 @@ impl Descent {
     pub fn start(&mut self, boxes: &Boxes) {
         self.stack.clear();
         let (top, level) = boxes.top();
-        self.stack.push(Left {
+        self.stack.push(Unvisited {
             level,
             first: top.first,
             mask: top.all(),
@@ -354,7 +354,7 @@ impl Descent {
             }
             let children = boxes.children(level, node);
             let mask = overlapping::<S::F32, _, _>(children, query) & children.all();
-            self.stack.push(Left {
+            self.stack.push(Unvisited {
                 level: level - 1,
                 first: children.first,
                 mask,

@@ -111,22 +111,22 @@ struct RayCandidate {
     body: usize,
     /// The place of the element in the order of the clusters.
     slot: usize,
-    met: Option<Met>,
+    met: Option<HitPoint>,
 }
 
-/// The numbers of a hit.
+/// Where on its way a ray meets an element, and where of the element.
 #[derive(Clone, Copy)]
-struct Met {
+struct HitPoint {
     t: f64,
     t_end: f64,
     feature: Feature,
     barycentrics: [f64; 3],
 }
 
-impl Met {
+impl HitPoint {
     fn exactly(ray: &Ray, corners: &[Point]) -> Option<Self> {
         let meeting = meet(ray, corners)?;
-        Some(Met {
+        Some(HitPoint {
             t: meeting.entry.rounded_down(),
             t_end: meeting.exit.rounded_down(),
             feature: meeting.feature,
@@ -137,7 +137,7 @@ impl Met {
 
 /// A hit among others of its ray.
 struct RayFound {
-    met: Met,
+    met: HitPoint,
     body: usize,
     element: ElementIx,
     corners: Corners,
@@ -398,7 +398,7 @@ impl RaySearch<'_> {
                 RayPasses::Inside(low, high) => (low, high, None),
                 RayPasses::InDoubt => {
                     self.looks.step()?;
-                    let Some(met) = Met::exactly(ray, corners.points()) else {
+                    let Some(met) = HitPoint::exactly(ray, corners.points()) else {
                         continue;
                     };
                     // The exact parameter is below the next float.
@@ -551,13 +551,13 @@ impl RaySearch<'_> {
                 for (lane, &of_lane) in of_batch[..n].iter().enumerate() {
                     let (ray, face) = &batch[lane];
                     self.found[of_lane].met = match found[lane] {
-                        Some((t, barycentrics)) => Some(Met {
+                        Some((t, barycentrics)) => Some(HitPoint {
                             t,
                             t_end: t,
                             feature: Feature::Face,
                             barycentrics,
                         }),
-                        None => Met::exactly(ray, face),
+                        None => HitPoint::exactly(ray, face),
                     };
                 }
                 n = 0;

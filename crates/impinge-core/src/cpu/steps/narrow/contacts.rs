@@ -1,6 +1,6 @@
 //! The contacts that one worker has found in a step, and the pairs whose contacts are still sought.
 
-use crate::cpu::narrow::room_to_wait;
+use crate::cpu::narrow::waiting_capacity;
 use crate::plan::Plan;
 use crate::query::goal::Goal;
 use crate::query::pair_kind::PairKind;
@@ -72,7 +72,7 @@ impl FirstContacts {
         self.found.iter_mut().for_each(Vec::clear);
         for list in [&mut self.open, &mut self.later, &mut self.single] {
             list.clear();
-            list.reserve_exact(room_to_wait(tuning));
+            list.reserve_exact(waiting_capacity(tuning));
         }
         self.between = None;
         self.unsure.clear();

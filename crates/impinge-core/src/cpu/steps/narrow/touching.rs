@@ -152,7 +152,7 @@ impl FirstContacts {
     /// time until which it certainly does not touch, and a later one by which it certainly does, at
     /// one time only, if there is one.
     #[cfg(feature = "gpu")]
-    pub fn take_left(
+    pub fn take_undecided(
         &mut self,
         isa: Isa,
         world: StepWorld<'_>,
