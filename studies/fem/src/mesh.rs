@@ -77,7 +77,7 @@ impl Mesh {
         }
         let points: Vec<[f64; 3]> = rest.iter().map(|&point| point.into()).collect();
         let tetrahedra: Vec<[u32; 4]> = mesh.elements.iter().map(corners).collect();
-        mesh.depths = solid_depths(&points, &tetrahedra, &mesh.surface);
+        mesh.depths = solid_depths(&points, &tetrahedra, &mesh.surface)?;
         Ok(mesh)
     }
 

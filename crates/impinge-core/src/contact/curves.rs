@@ -14,6 +14,7 @@ use crate::boxes::scale::Scale;
 use crate::scene::error::Error;
 use crate::scene::vector::dot;
 use crate::search::sink::{filled, grow, with_capacity};
+use crate::search::sparse_rows::SparseRows;
 
 /// What memory is for.
 const WHAT: &str = "curves of contact";
@@ -57,12 +58,12 @@ impl Curves {
             isolated: isolated(contacts)?,
             ..Curves::default()
         };
-        let at = LinksAtPoints::new(contacts.points().len(), &links)?;
+        let at = links_at_points(contacts.points().len(), &links)?;
         let mut is_used = filled(false, links.len(), WHAT)?;
         // Open chains first, from each end or junction; then loops, each from its lowest segment.
         for point in 0..contacts.points().len() {
-            if at.links(point).len() != 2 {
-                for &link in at.links(point) {
+            if at.of(point).len() != 2 {
+                for &link in at.of(point) {
                     if !is_used[link as usize] {
                         let start = point as u32;
                         let chain = Chain::follow(&links, &at, &mut is_used, link, start)?;
@@ -251,34 +252,12 @@ fn isolated(contacts: &Contacts) -> Result<Vec<u32>, Error> {
 }
 
 /// The links at each point.
-struct LinksAtPoints {
-    starts: Vec<usize>,
-    links: Vec<u32>,
-}
-
-impl LinksAtPoints {
-    fn new(n_points: usize, links: &[Link]) -> Result<Self, Error> {
-        let mut starts = filled(0, n_points + 2, WHAT)?;
-        for end in links.iter().flat_map(|link| link.ends) {
-            starts[end as usize + 2] += 1;
-        }
-        for point in 2..starts.len() {
-            starts[point] += starts[point - 1];
-        }
-        let mut at = filled(0, 2 * links.len(), WHAT)?;
-        for (number, link) in (0u32..).zip(links) {
-            for end in link.ends {
-                let place = &mut starts[end as usize + 1];
-                at[*place] = number;
-                *place += 1;
-            }
-        }
-        Ok(LinksAtPoints { starts, links: at })
-    }
-
-    fn links(&self, point: usize) -> &[u32] {
-        &self.links[self.starts[point]..self.starts[point + 1]]
-    }
+fn links_at_points(n_points: usize, links: &[Link]) -> Result<SparseRows<u32>, Error> {
+    let ends = || {
+        let numbered = (0u32..).zip(links);
+        numbered.flat_map(|(number, link)| link.ends.map(|end| (end, number)))
+    };
+    SparseRows::new(n_points, ends, WHAT)
 }
 
 /// A chain of points; a loop ends with its first point.
@@ -292,7 +271,7 @@ impl Chain {
     /// Follows links from a point to an end, to a junction, or back to the start.
     fn follow(
         links: &[Link],
-        at: &LinksAtPoints,
+        at: &SparseRows<u32>,
         is_used: &mut [bool],
         first: u32,
         start: u32,
@@ -319,7 +298,7 @@ impl Chain {
             grow(&mut chain.points, 1, WHAT)?;
             chain.points.push(next);
             here = next;
-            let onward = at.links(here as usize);
+            let onward = at.of(here as usize);
             let unused = onward.iter().find(|&&other| !is_used[other as usize]);
             match unused {
                 Some(&other) if onward.len() == 2 && here != start => link = other,

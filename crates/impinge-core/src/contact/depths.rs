@@ -7,8 +7,14 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use crate::scene::error::Error;
 use crate::scene::index::{ElementIx, VertexIx};
+use crate::search::sink::filled;
+use crate::search::sparse_rows::SparseRows;
 use impinge_exact::Point;
+
+/// What memory is for.
+const WHAT: &str = "depths of vertices";
 
 /// A vertex in the queue: nearest first, ties by number.
 #[derive(PartialEq)]
@@ -38,21 +44,31 @@ impl PartialOrd for WaitingVertex {
 /// positions: the length of the shortest path along edges to a vertex of a surface triangle.
 /// Finite; 0 for vertices on the surface and for those without a path to it.
 ///
+/// # Errors
+/// There is no memory.
+///
 /// # Panics
 /// If a tetrahedron or a triangle names a vertex that has no position.
 ///
 /// ```
 /// use impinge::contact::solid_depths;
+/// # fn main() -> Result<(), impinge::Error> {
 /// let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-/// assert_eq!(solid_depths(&corners, &[[0, 1, 2, 3]], &[[0, 1, 2]]), [0.0, 0.0, 0.0, 1.0]);
+/// let depths = solid_depths(&corners, &[[0, 1, 2, 3]], &[[0, 1, 2]])?;
+/// assert_eq!(depths, [0.0, 0.0, 0.0, 1.0]);
+/// # Ok(()) }
 /// ```
 pub fn solid_depths(
     positions: &[Point],
     tetrahedra: &[[u32; 4]],
     surface: &[[u32; 3]],
-) -> Vec<f64> {
-    let around = TetrahedraAround::new(positions.len(), tetrahedra);
-    let mut depths = vec![f64::INFINITY; positions.len()];
+) -> Result<Vec<f64>, Error> {
+    let corners = || {
+        let numbered = (0..).map(ElementIx::new).zip(tetrahedra);
+        numbered.flat_map(|(ix, corners)| corners.iter().map(move |&corner| (corner, ix)))
+    };
+    let around = SparseRows::new(positions.len(), corners, WHAT)?;
+    let mut depths = filled(f64::INFINITY, positions.len(), WHAT)?;
     let mut waiting = BinaryHeap::new();
     for &corner in surface.as_flattened() {
         let vertex = VertexIx::new(corner);
@@ -65,7 +81,7 @@ pub fn solid_depths(
         if depth > depths[vertex.index()] {
             continue;
         }
-        for &tetrahedron in around.of(vertex) {
+        for &tetrahedron in around.of(vertex.index()) {
             for next in tetrahedra[tetrahedron.index()].map(VertexIx::new) {
                 let [p, q] = [vertex, next].map(|vertex| positions[vertex.index()]);
                 let [x, y, z] = [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
@@ -85,42 +101,7 @@ pub fn solid_depths(
             *depth = 0.0;
         }
     }
-    depths
-}
-
-/// The tetrahedra around each vertex, one list after the other.
-struct TetrahedraAround {
-    starts: Vec<u32>,
-    tetrahedra: Vec<ElementIx>,
-}
-
-impl TetrahedraAround {
-    fn new(n_vertices: usize, tetrahedra: &[[u32; 4]]) -> Self {
-        let mut starts = vec![0u32; n_vertices + 1];
-        for &corner in tetrahedra.as_flattened() {
-            starts[corner as usize + 1] += 1;
-        }
-        for ix in 0..n_vertices {
-            starts[ix + 1] += starts[ix];
-        }
-        let mut next = starts.clone();
-        let mut around = vec![ElementIx::default(); 4 * tetrahedra.len()];
-        for (tetrahedron, corners) in (0..).map(ElementIx::new).zip(tetrahedra) {
-            for &corner in corners {
-                around[next[corner as usize] as usize] = tetrahedron;
-                next[corner as usize] += 1;
-            }
-        }
-        TetrahedraAround {
-            starts,
-            tetrahedra: around,
-        }
-    }
-
-    fn of(&self, vertex: VertexIx) -> &[ElementIx] {
-        let [start, end] = [0, 1].map(|k| self.starts[vertex.index() + k] as usize);
-        &self.tetrahedra[start..end]
-    }
+    Ok(depths)
 }
 
 #[cfg(test)]
@@ -132,12 +113,14 @@ mod tests {
         // Each tetrahedron shares three corners with the next one.
         let positions: Vec<Point> = (0..12).map(|ix| [f64::from(ix), 0.0, 0.0]).collect();
         let tetrahedra: Vec<[u32; 4]> = (0..9).map(|ix| [ix, ix + 1, ix + 2, ix + 3]).collect();
-        let depths = solid_depths(&positions, &tetrahedra, &[[0, 1, 0]]);
+        let depths = |positions: &[Point], surface: &[[u32; 3]]| {
+            solid_depths(positions, &tetrahedra, surface).expect("memory")
+        };
         let expected: Vec<f64> = (0..12).map(|ix| f64::from(ix - 1).max(0.0)).collect();
-        assert_eq!(depths, expected);
+        assert_eq!(depths(&positions, &[[0, 1, 0]]), expected);
         // A vertex of no tetrahedron, and no surface at all.
         let alone = [positions, vec![[5.0; 3]]].concat();
-        assert_eq!(solid_depths(&alone, &tetrahedra, &[[0, 1, 0]])[12], 0.0);
-        assert_eq!(solid_depths(&alone, &tetrahedra, &[]), [0.0; 13]);
+        assert_eq!(depths(&alone, &[[0, 1, 0]])[12], 0.0);
+        assert_eq!(depths(&alone, &[]), [0.0; 13]);
     }
 }

@@ -9,6 +9,8 @@
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::VertexIx;
+use crate::search::sink::{filled, with_capacity};
+use crate::search::sparse_rows::SparseRows;
 use crate::search::work::{Equal, Work};
 
 /// Faces whose edges are sorted by one task.
@@ -19,8 +21,7 @@ const WHAT: &str = "edges of a closed surface";
 /// The edges at each vertex.
 #[derive(Debug)]
 pub(super) struct EdgesAround {
-    starts: Vec<u32>,
-    neighbours: Vec<VertexIx>,
+    neighbours: SparseRows<VertexIx>,
     /// For each vertex, the number of its connected piece; 0 for a vertex of no face.
     pieces: Vec<u32>,
     n_pieces: usize,
@@ -29,9 +30,7 @@ pub(super) struct EdgesAround {
 impl EdgesAround {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.starts[..])
-            + size_of_val(&self.neighbours[..])
-            + size_of_val(&self.pieces[..])
+        self.neighbours.bytes() + size_of_val(&self.pieces[..])
     }
 
     /// How many pieces there are that no edge connects.
@@ -45,9 +44,9 @@ impl EdgesAround {
     }
 
     /// Numbers the connected pieces.
-    fn find_pieces(&mut self, n_vertices: usize) {
+    fn find_pieces(&mut self, n_vertices: usize) -> Result<(), Error> {
         const NONE: u32 = u32::MAX;
-        self.pieces = vec![NONE; n_vertices];
+        self.pieces = filled(NONE, n_vertices, WHAT)?;
         let mut members = Vec::new();
         for seed in VertexIx::up_to(n_vertices) {
             if self.pieces[seed.index()] != NONE {
@@ -62,9 +61,7 @@ impl EdgesAround {
             self.pieces[seed.index()] = piece;
             members.push(seed);
             while let Some(vertex) = members.pop() {
-                let at = vertex.index();
-                let own = self.starts[at] as usize..self.starts[at + 1] as usize;
-                for other in &self.neighbours[own] {
+                for other in self.neighbours.of(vertex.index()) {
                     if self.pieces[other.index()] == NONE {
                         self.pieces[other.index()] = piece;
                         members.push(*other);
@@ -72,10 +69,11 @@ impl EdgesAround {
                 }
             }
         }
+        Ok(())
     }
 
     /// # Errors
-    /// The surface is not closed; the error names an edge. Cancellation.
+    /// The surface is not closed; the error names an edge. There is no memory, cancellation.
     pub fn new(
         body: BodyId,
         faces: &[[u32; 3]],
@@ -99,7 +97,7 @@ impl EdgesAround {
             Ok(())
         })?;
         let sides = work.merged(runs, Equal::All, WHAT)?;
-        let mut edges: Vec<[u32; 2]> = Vec::with_capacity(sides.len() / 2);
+        let mut edges: Vec<[u32; 2]> = with_capacity(sides.len() / 2, WHAT)?;
         for edge in sides.chunk_by(|x, y| x.0 == y.0) {
             let ends = [(edge[0].0 >> 32) as u32, edge[0].0 as u32];
             let n_forward = edge.iter().filter(|side| side.1).count();
@@ -115,28 +113,17 @@ impl EdgesAround {
             edges.push(ends);
         }
         work.step()?;
-        let mut starts = vec![0u32; n_vertices + 2];
-        for end in edges.as_flattened() {
-            starts[*end as usize + 2] += 1;
-        }
-        for vertex in 2..starts.len() {
-            starts[vertex] += starts[vertex - 1];
-        }
-        let mut neighbours = vec![VertexIx::default(); 2 * edges.len()];
-        for &[low, high] in &edges {
-            for (at, other) in [(low, high), (high, low)] {
-                let place = &mut starts[at as usize + 1];
-                neighbours[*place as usize] = VertexIx::new(other);
-                *place += 1;
-            }
-        }
+        let ends = || {
+            let both = |&[low, high]: &[u32; 2]| [(low, high), (high, low)];
+            let ends = edges.iter().flat_map(both);
+            ends.map(|(at, other)| (at, VertexIx::new(other)))
+        };
         let mut topology = EdgesAround {
-            starts,
-            neighbours,
+            neighbours: SparseRows::new(n_vertices, ends, WHAT)?,
             pieces: Vec::new(),
             n_pieces: 0,
         };
-        topology.find_pieces(n_vertices);
+        topology.find_pieces(n_vertices)?;
         // Faces that name a vertex twice may have no edges at all.
         topology.n_pieces = topology.n_pieces.max(1);
         Ok(topology)
@@ -144,7 +131,6 @@ impl EdgesAround {
 
     /// The vertices that share an edge with this one; none for a vertex of no face.
     pub fn neighbours(&self, vertex: VertexIx) -> &[VertexIx] {
-        let at = vertex.index();
-        &self.neighbours[self.starts[at] as usize..self.starts[at + 1] as usize]
+        self.neighbours.of(vertex.index())
     }
 }

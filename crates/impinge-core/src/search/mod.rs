@@ -12,6 +12,7 @@ pub(crate) mod sets;
 pub(crate) mod shares;
 pub mod sink;
 pub(crate) mod sort;
+pub(crate) mod sparse_rows;
 pub(crate) mod stats;
 #[cfg(feature = "gpu")]
 pub(crate) mod undecided;

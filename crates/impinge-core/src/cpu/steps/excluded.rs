@@ -26,6 +26,7 @@ use crate::query::pair_set::SortedKeys;
 use crate::scene::error::Error;
 use crate::scene::index::{ClusterIx, Number, PartIx, Slot, pair_numbers};
 use crate::search::sink::{filled, grow, reserve};
+use crate::search::sparse_rows::SparseRows;
 use crate::search::work::Work;
 use crate::simd::{Lanes, Masks};
 
@@ -90,7 +91,7 @@ impl ExcludedLanes {
         let finder = ExclusionFinder {
             clusterings,
             is_own,
-            slots: SlotsOfVertices::new(clusterings[1])?,
+            slots: slots_of_vertices(clusterings[1])?,
             rule,
             named: named(plan, parts, clusterings, rule)?,
         };
@@ -167,7 +168,8 @@ struct ExcludedRun {
 struct ExclusionFinder<'a> {
     clusterings: [&'a Clustering; 2],
     is_own: bool,
-    slots: SlotsOfVertices,
+    /// The elements of the second part at each vertex.
+    slots: SparseRows<Slot>,
     rule: &'a OwnRule,
     /// Pairs that are left out by name, sorted: the first slot in the upper half.
     named: Vec<u64>,
@@ -246,7 +248,7 @@ impl ExclusionFinder<'_> {
         by_vertex.begin(vertices.len());
         for (row, &vertex) in vertices.iter().enumerate() {
             let mut put = |vertex| {
-                for &slot in self.slots.of(vertex) {
+                for &slot in self.slots.of(vertex as usize) {
                     if !self.is_own || slot.cluster() >= cluster {
                         by_vertex.put(row, slot);
                     }
@@ -302,50 +304,17 @@ impl ExclusionFinder<'_> {
 }
 
 /// The elements at each vertex.
-#[derive(Debug)]
-struct SlotsOfVertices {
-    starts: Vec<u32>,
-    slots: Vec<Slot>,
-}
-
-impl SlotsOfVertices {
-    fn new(clustering: &Clustering) -> Result<Self, Error> {
-        let elements = || (0..clustering.order.len()).map(|slot| clustering.corners.corners(slot));
-        let last = clustering.vertices.iter().max();
-        let n = last.map_or(0, |&last| last as usize + 1);
-        // Counted one place later, so that the second pass can move each start to its end.
-        let mut starts = filled(0u32, n + 2, WHAT)?;
-        let mut n_corners = 0;
-        for &corner in elements().flatten() {
-            starts[corner as usize + 2] += 1;
-            n_corners += 1;
-        }
-        for vertex in 0..n {
-            starts[vertex + 2] += starts[vertex + 1];
-        }
-        let mut slots = filled(Slot::default(), n_corners, WHAT)?;
-        for (slot, corners) in elements().enumerate() {
-            for &corner in corners {
-                let next = &mut starts[corner as usize + 1];
-                slots[*next as usize] = Slot::from_usize(slot);
-                *next += 1;
-            }
-        }
-        Ok(SlotsOfVertices { starts, slots })
-    }
-
-    #[inline]
-    fn of(&self, vertex: u32) -> &[Slot] {
-        let vertex = vertex as usize;
-        // One more start than there are vertices is the end.
-        match self.starts.get(vertex + 2) {
-            None => &[],
-            Some(_) => {
-                let [start, end] = [0, 1].map(|next| self.starts[vertex + next] as usize);
-                &self.slots[start..end]
-            }
-        }
-    }
+fn slots_of_vertices(clustering: &Clustering) -> Result<SparseRows<Slot>, Error> {
+    let last = clustering.vertices.iter().max();
+    let n = last.map_or(0, |&last| last as usize + 1);
+    let corners = || {
+        let slots = 0..clustering.order.len();
+        slots.flat_map(|slot| {
+            let corners = clustering.corners.corners(slot).iter();
+            corners.map(move |&corner| (corner, Slot::from_usize(slot)))
+        })
+    };
+    SparseRows::new(n, corners, WHAT)
 }
 
 /// The pairs of two parts that are left out by name, sorted: the first slot in the upper half.
