@@ -74,11 +74,20 @@ fn cpu() -> Option<String> {
     std::env::var("PROCESSOR_IDENTIFIER").ok()
 }
 
+/// With the features that the library asks for: see `Isa::detect` of `impinge-core`.
 #[cfg(target_arch = "x86_64")]
 fn vectors() -> &'static str {
-    if std::arch::is_x86_feature_detected!("avx512f") {
+    use std::arch::is_x86_feature_detected as has;
+
+    let counts_bits = has!("bmi1") && has!("bmi2") && has!("popcnt") && has!("lzcnt");
+    let has_avx512 = has!("avx512f")
+        && has!("avx512vl")
+        && has!("avx512dq")
+        && has!("avx512bw")
+        && has!("avx512vbmi2");
+    if has_avx512 && counts_bits {
         "AVX-512"
-    } else if std::arch::is_x86_feature_detected!("avx2") {
+    } else if has!("avx2") && counts_bits {
         "AVX2"
     } else {
         "SSE2"
