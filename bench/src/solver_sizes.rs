@@ -5,7 +5,7 @@
 //! edge length apart. Pairs within a ring of the surface are left out. What is allowed is asked
 //! about, too: the way to truncated positions is free, and as many pairs are listed as are near.
 
-use impinge::{Detector, Exclusion, Method, Positions, Query, Scene};
+use impinge::{Detector, Exclusion, Method, Query, Scene};
 use serde_json::json;
 
 use crate::report::{Report, figures, grouped};
@@ -72,9 +72,7 @@ fn measure(mut layers: Layers, options: &Options, report: &mut Report) -> Result
     })?;
     add("truncate", ms);
     for (body, at) in truncation.iter() {
-        if let Positions::F32(at) = at {
-            layers.scene.set_end_positions(body, at)?;
-        }
+        layers.scene.set_end_positions(body, at)?;
     }
     if !stops.is_free(&layers.scene, &query)? {
         return Err(format!("{n_faces} faces: the truncated step is not free").into());

@@ -85,17 +85,9 @@ impl Moving {
 
     /// Writes the positions at both ends.
     fn rewrite(&mut self) -> Result<(), Failure> {
-        match &self.ends {
-            [Positions::F32(start), Positions::F32(end)] => {
-                self.scene.set_positions(self.body, start)?;
-                self.scene.set_end_positions(self.body, end)?;
-            }
-            [Positions::F64(start), Positions::F64(end)] => {
-                self.scene.set_positions(self.body, start)?;
-                self.scene.set_end_positions(self.body, end)?;
-            }
-            _ => return Err("two precisions".into()),
-        }
+        let [start, end] = &self.ends;
+        self.scene.set_positions(self.body, start)?;
+        self.scene.set_end_positions(self.body, end)?;
         Ok(())
     }
 }

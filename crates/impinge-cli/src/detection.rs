@@ -142,25 +142,13 @@ pub fn repeat(
             let pairs = detector.detect(scene, query)?;
             times.add(pairs.stats());
             for (id, positions) in &rest {
-                set_positions(scene, *id, positions)?;
+                scene.set_positions(*id, positions)?;
             }
         }
     }
     let pairs = detector.detect(scene, query)?;
     times.add(pairs.stats());
     Ok((pairs, times))
-}
-
-/// Sets a body's positions, in either precision.
-pub fn set_positions(
-    scene: &mut Scene,
-    body: BodyId,
-    positions: &Positions,
-) -> Result<(), impinge::Error> {
-    match positions {
-        Positions::F32(positions) => scene.set_positions(body, positions),
-        Positions::F64(positions) => scene.set_positions(body, positions),
-    }
 }
 
 /// Wall times of frames in milliseconds, in total and by stage.

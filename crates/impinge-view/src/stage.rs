@@ -1,6 +1,6 @@
 //! The bodies where they are now: a frame's positions, moved by the user's matrices.
 
-use impinge::{BodyId, Positions, Scene};
+use impinge::{BodyId, Scene};
 
 use crate::content::Content;
 
@@ -47,7 +47,9 @@ impl Stage {
     pub fn pose(&mut self, frame_ix: usize) -> Result<(), String> {
         if let Some(frames) = &self.content.frames {
             for (id, positions) in frames.read(frame_ix)? {
-                set_positions(&mut self.content.scene, id, &positions)
+                self.content
+                    .scene
+                    .set_positions(id, &positions)
                     .map_err(|error| format!("frame {frame_ix}: {error}"))?;
                 let bodies = &self.content.bodies;
                 let body = bodies.iter().position(|shown| shown.id == id);
@@ -100,11 +102,9 @@ impl Stage {
                 .map_err(|error| error.to_string())?;
             let end = end.positions().clone();
             let scene = &mut self.content.scene;
-            match &end {
-                Positions::F32(positions) => scene.set_end_positions(id, positions),
-                Positions::F64(positions) => scene.set_end_positions(id, positions),
-            }
-            .map_err(|error| format!("frame {next}: {error}"))?;
+            scene
+                .set_end_positions(id, end)
+                .map_err(|error| format!("frame {next}: {error}"))?;
         }
         Ok(true)
     }
@@ -147,16 +147,5 @@ pub(crate) fn include(bounds: &mut [[f64; 3]; 2], point: [f64; 3]) {
     for k in 0..3 {
         bounds[0][k] = bounds[0][k].min(point[k]);
         bounds[1][k] = bounds[1][k].max(point[k]);
-    }
-}
-
-fn set_positions(
-    scene: &mut Scene,
-    body: BodyId,
-    positions: &Positions,
-) -> Result<(), impinge::Error> {
-    match positions {
-        Positions::F32(positions) => scene.set_positions(body, positions),
-        Positions::F64(positions) => scene.set_positions(body, positions),
     }
 }

@@ -208,11 +208,7 @@ fn expected(content: &Content) -> Vec<(u64, u64)> {
     (0..frames.n_frames())
         .map(|frame_ix| {
             for (id, positions) in frames.read(frame_ix).expect("a frame") {
-                match positions {
-                    Positions::F32(positions) => scene.set_positions(id, &positions),
-                    Positions::F64(positions) => scene.set_positions(id, &positions),
-                }
-                .expect("accepted");
+                scene.set_positions(id, positions).expect("accepted");
             }
             let pairs = detector.detect(&scene, &query).expect("an answer");
             (pairs.len() as u64, pairs.hash())

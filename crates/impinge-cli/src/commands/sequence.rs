@@ -11,7 +11,7 @@ use super::step::{self, Frames as _, Shown, steps_of_sequence};
 use crate::apart::Inputs;
 use crate::args::{BodiesArg, SequenceArgs};
 use crate::asked::{Asked, thicken};
-use crate::detection::{Times, asked, detector, hit, query, set_positions, settings};
+use crate::detection::{Times, asked, detector, hit, query, settings};
 use crate::error::Error;
 use crate::files::{Files, FrameFiles};
 use crate::load::{Bodies, Loading, tell, to_positions};
@@ -134,7 +134,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let mut n_pairs = 0;
     for frame_ix in range {
         go_on(cancel)?;
-        let set = |positions: &_| set_positions(&mut scene, moving, positions);
+        let set = |positions: &impinge::Positions| scene.set_positions(moving, positions);
         if frames.take(frame_ix, set)?.is_none() {
             continue;
         }

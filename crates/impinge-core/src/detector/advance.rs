@@ -243,10 +243,8 @@ pub(super) fn set_end_positions(
     scene: &mut Scene,
     ends: &[(BodyId, Positions)],
 ) -> Result<(), Error> {
-    ends.iter().try_for_each(|(id, positions)| match positions {
-        Positions::F32(positions) => scene.set_end_positions(*id, positions),
-        Positions::F64(positions) => scene.set_end_positions(*id, positions),
-    })
+    ends.iter()
+        .try_for_each(|(id, positions)| scene.set_end_positions(*id, positions))
 }
 
 /// Their positions at a fraction of the step, rounded.

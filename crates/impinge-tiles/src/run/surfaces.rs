@@ -176,10 +176,7 @@ impl<'a> SurfaceScene<'a> {
             .collect();
         let [start, end] = [0, 1].map(|pose| surface.at(pose, &vertices));
         let id = self.scene.add((triangles, start))?;
-        match end {
-            Positions::F32(end) => self.scene.set_end_positions(id, &end)?,
-            Positions::F64(end) => self.scene.set_end_positions(id, &end)?,
-        }
+        self.scene.set_end_positions(id, end)?;
         self.bodies.push(OfSurface {
             id,
             surface,

@@ -55,11 +55,7 @@ fn pile<R: Real>(n: usize, round: impl Fn(f64) -> R + Copy) -> (Scene, Vec<BodyI
 fn stopped(scene: &Scene, truncation: &Truncation) -> Scene {
     let mut scene = scene.clone();
     for (id, at) in truncation.iter() {
-        match at {
-            Positions::F32(at) => scene.set_end_positions(id, at),
-            Positions::F64(at) => scene.set_end_positions(id, at),
-        }
-        .expect("good");
+        scene.set_end_positions(id, at).expect("good");
     }
     scene
 }

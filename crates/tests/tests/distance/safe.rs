@@ -2,8 +2,8 @@
 
 use impinge_core::exact::{ElementPair, Point, are_within, closest_points, edge_face_are_within};
 use impinge_core::{
-    BodyId, Bounds, Csr, Elements, Error, Method, PairKind, Part, Positions, Query, SafeDistances,
-    Scene, Thickness,
+    BodyId, Bounds, Csr, Elements, Error, Method, PairKind, Part, Query, SafeDistances, Scene,
+    Thickness,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
 use impinge_tests::{detector, detectors};
@@ -542,11 +542,8 @@ fn paths_with_corners_within_the_bounds_never_touch() {
             n_ways += 1;
             for (body, _) in &starts {
                 let end = scene.body(*body).expect("held").end_positions().cloned();
-                match end.expect("it moves") {
-                    Positions::F32(end) => scene.set_positions(*body, end),
-                    Positions::F64(end) => scene.set_positions(*body, end),
-                }
-                .expect("good");
+                let end = end.expect("it moves");
+                scene.set_positions(*body, end).expect("good");
                 scene.clear_end_positions(*body).expect("good");
             }
         }

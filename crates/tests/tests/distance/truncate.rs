@@ -1,8 +1,6 @@
 //! How far each vertex may go in a step: by the exact test of the whole step.
 
-use impinge_core::{
-    BodyId, Error, Method, PairFilter, Positions, Query, Real, Scene, Start, Truncation,
-};
+use impinge_core::{BodyId, Error, Method, PairFilter, Query, Real, Scene, Start, Truncation};
 use impinge_scenes::{Random, soup, surfaces};
 use impinge_tests::{detector, detectors};
 
@@ -24,11 +22,7 @@ pub(super) fn ways(scene: &Scene, truncation: &Truncation) -> Vec<[[f64; 3]; 3]>
 pub(super) fn with_ends(scene: &Scene, truncation: &Truncation) -> Scene {
     let mut scene = scene.clone();
     for (id, at) in truncation.iter() {
-        match at {
-            Positions::F32(at) => scene.set_end_positions(id, at),
-            Positions::F64(at) => scene.set_end_positions(id, at),
-        }
-        .expect("as many");
+        scene.set_end_positions(id, at).expect("as many");
     }
     scene
 }

@@ -11,7 +11,7 @@ use crate::resident_steps::{assert_between, listed};
 use crate::safe::{check_asked, safe_of};
 
 use impinge_core::{
-    Backend, BodyId, Detector, Elements, Exclusion, PairKind, Positions, Query, Scene, Settings,
+    Backend, BodyId, Detector, Elements, Exclusion, PairKind, Query, Scene, Settings,
 };
 use impinge_scenes::{Random, solids, surfaces};
 
@@ -142,11 +142,7 @@ fn steps_and_safe_distances_on_the_device_leave_out_what_the_question_does() {
         let faces: Vec<[u32; 3]> = faces.iter().copied().step_by(2 + step).collect();
         let mesh = (Elements::from(faces), body.positions().clone());
         scene.remesh(bodies[0], mesh).expect("good");
-        match ends {
-            Positions::F32(ends) => scene.set_end_positions(bodies[0], &ends),
-            Positions::F64(ends) => scene.set_end_positions(bodies[0], &ends),
-        }
-        .expect("good");
+        scene.set_end_positions(bodies[0], ends).expect("good");
     }
     let (found, pairs, _) = listed(&caller, &mut detector, &scene, &query, [&[], &[]]);
     assert_between("re-meshed", &found, &pairs, &scene, &query, &query);

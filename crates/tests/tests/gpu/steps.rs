@@ -455,11 +455,7 @@ fn moved_until_contact(scene: &Scene, step: &Query) -> Scene {
     let advance = on_cpu().advance(scene, step).expect("good");
     let mut scene = scene.clone();
     for (body, positions) in advance.iter() {
-        match positions {
-            impinge_core::Positions::F32(end) => scene.set_end_positions(body, end),
-            impinge_core::Positions::F64(end) => scene.set_end_positions(body, end),
-        }
-        .expect("known");
+        scene.set_end_positions(body, positions).expect("known");
     }
     scene
 }

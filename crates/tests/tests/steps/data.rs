@@ -260,11 +260,7 @@ fn a_step_of_cloth_can_be_taken_up_to_its_first_contact() {
         );
         assert!(advance.fraction <= first && advance.fraction > 0.5 * first);
         for (body, positions) in advance.iter() {
-            match positions {
-                impinge_core::Positions::F32(end) => scene.set_end_positions(body, end),
-                impinge_core::Positions::F64(end) => scene.set_end_positions(body, end),
-            }
-            .expect("good");
+            scene.set_end_positions(body, positions).expect("good");
         }
         assert!(detector.is_free(&scene, &step).expect("good"));
     }

@@ -715,17 +715,10 @@ fn reversed(scene: &Scene) -> Scene {
     let mut reversed = scene.clone();
     for (id, body) in scene.bodies() {
         let end = body.end_positions().expect("all move");
-        match (body.positions(), end) {
-            (Positions::F32(start), Positions::F32(end)) => {
-                reversed.set_positions(id, end).expect("good");
-                reversed.set_end_positions(id, start).expect("good");
-            }
-            (Positions::F64(start), Positions::F64(end)) => {
-                reversed.set_positions(id, end).expect("good");
-                reversed.set_end_positions(id, start).expect("good");
-            }
-            _ => unreachable!("one precision per body"),
-        }
+        reversed.set_positions(id, end).expect("good");
+        reversed
+            .set_end_positions(id, body.positions())
+            .expect("good");
     }
     reversed
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use impinge::{BodyId, Detector, Positions, Query, Scene};
 
-use crate::detection::{Times, hit, set_positions};
+use crate::detection::{Times, hit};
 use crate::error::Error;
 use crate::origins::Origins;
 use crate::output::out;
@@ -14,7 +14,6 @@ use crate::rows::{self, Rows};
 use crate::text::{counted, grouped};
 
 use super::answer::Found;
-use super::load::set_end_positions;
 
 /// How many steps there are, how many of them are free, and how many start with an intersection.
 #[derive(Default)]
@@ -103,8 +102,8 @@ pub fn steps_of_sequence(
         let has_before = std::mem::replace(&mut before, false);
         let is_first = !(has_before && frames.follows(end_ix));
         let end = frames.take(end_ix, |end| match is_first {
-            true => set_positions(scene, moving, end),
-            false => set_end_positions(scene, moving, end),
+            true => scene.set_positions(moving, end),
+            false => scene.set_end_positions(moving, end),
         })?;
         let Some(end) = end else {
             continue;
@@ -152,7 +151,7 @@ pub fn steps_of_sequence(
         }
         out().flush()?;
         frame_done();
-        set_positions(scene, moving, &end)?;
+        scene.set_positions(moving, &end)?;
     }
     if let Some(rows) = shown.rows {
         rows.finish()?;

@@ -3,11 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use impinge::{BodyId, CancelToken, Positions, Scene};
+use impinge::{BodyId, CancelToken, Scene};
 use impinge_io::{Elements, Format, Mesh, ReadOptions, Weld, printable, read_with_summary};
 
 use crate::args::StepArgs;
-use crate::detection::set_positions;
 use crate::error::Error;
 use crate::load::{STDIN, Vertices, tell, tell_coincident, to_elements, to_positions};
 use crate::origins::{Origin, Origins};
@@ -79,9 +78,9 @@ impl Moving {
         for &id in &self.ids {
             let body = self.scene.body(id)?;
             let (start, end) = (body.positions().clone(), body.end_positions().cloned());
-            set_positions(&mut self.scene, id, &start)?;
+            self.scene.set_positions(id, &start)?;
             if let Some(end) = end {
-                set_end_positions(&mut self.scene, id, &end)?;
+                self.scene.set_end_positions(id, end)?;
             }
         }
         Ok(())
@@ -140,25 +139,14 @@ impl Moving {
             .scene
             .add((elements, positions))
             .map_err(refused(&names[0]))?;
-        set_end_positions(&mut self.scene, id, &to_positions(at_end.positions))
+        self.scene
+            .set_end_positions(id, to_positions(at_end.positions))
             .map_err(refused(&names[1]))?;
         self.ids.push(id);
         self.names.push(names);
         self.vertices.push(vertices);
         self.origins.push(origin);
         Ok(())
-    }
-}
-
-/// Sets the positions of a body at the end of the step, in either precision.
-pub fn set_end_positions(
-    scene: &mut Scene,
-    body: BodyId,
-    positions: &Positions,
-) -> Result<(), impinge::Error> {
-    match positions {
-        Positions::F32(positions) => scene.set_end_positions(body, positions),
-        Positions::F64(positions) => scene.set_end_positions(body, positions),
     }
 }
 
