@@ -43,48 +43,52 @@ fn lane_of(triangles: &Triangles8, lane: usize) -> [Point; 3] {
     std::array::from_fn(|vertex| std::array::from_fn(|axis| triangles[vertex][axis][lane]))
 }
 
-/// The answer of all instruction sets of this processor, which must be the same.
-fn on_all<P, T: PartialEq + std::fmt::Debug>(
-    pairs: &P,
-    portable: impl Fn(&P) -> T,
-    #[cfg(target_arch = "x86_64")] avx2: unsafe fn(&P) -> T,
-    #[cfg(target_arch = "x86_64")] avx512: unsafe fn(&P) -> T,
-) -> T {
-    let answer = portable(pairs);
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: just detected.
-            assert_eq!(answer, unsafe { avx2(pairs) });
+/// Defines a function that asks a generic one on all instruction sets of this processor, whose
+/// answers must be the same.
+macro_rules! on_all {
+    (f64: $($rest:tt)*) => { on_all!([Portable, Avx2, Avx512] $($rest)*); };
+    (f32: $($rest:tt)*) => { on_all!([Portable32, Avx2F32, Avx512F32] $($rest)*); };
+    (
+        [$portable:ident, $avx2:ident, $avx512:ident]
+        fn $name:ident($($arg:ident: $type:ty),*) -> $answer:ty = $($asked:ident)::+
+    ) => {
+        fn $name($($arg: $type),*) -> $answer {
+            use crate::filter::number;
+            let answer = $($asked)::+::<number::$portable>($($arg),*);
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx2")]
+                fn avx2($($arg: $type),*) -> $answer {
+                    $($asked)::+::<number::$avx2>($($arg),*)
+                }
+                #[target_feature(enable = "avx512f,avx512dq")]
+                fn avx512($($arg: $type),*) -> $answer {
+                    $($asked)::+::<number::$avx512>($($arg),*)
+                }
+                if is_x86_feature_detected!("avx2") {
+                    // SAFETY: just detected.
+                    assert_eq!(answer, unsafe { avx2($($arg),*) });
+                }
+                if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+                    // SAFETY: just detected.
+                    assert_eq!(answer, unsafe { avx512($($arg),*) });
+                }
+            }
+            answer
         }
-        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-            // SAFETY: just detected.
-            assert_eq!(answer, unsafe { avx512(pairs) });
-        }
-    }
-    answer
+    };
 }
+pub(crate) use on_all;
 
-fn classify(pairs: &TrianglePairs8) -> Verdict {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn avx2(pairs: &TrianglePairs8) -> Verdict {
-        filter::classify::<number::Avx2>(pairs)
-    }
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512dq")]
-    fn avx512(pairs: &TrianglePairs8) -> Verdict {
-        filter::classify::<number::Avx512>(pairs)
-    }
-    on_all(
-        pairs,
-        filter::classify::<number::Portable>,
-        #[cfg(target_arch = "x86_64")]
-        avx2,
-        #[cfg(target_arch = "x86_64")]
-        avx512,
-    )
-}
+on_all!(f64: fn classify(pairs: &TrianglePairs8) -> Verdict = filter::classify);
+on_all!(f64: fn reject_by_planes(pairs: &TrianglePairs8) -> u8 = filter::reject_by_planes);
+on_all!(
+    f64: fn classify_by_faces(pairs: &TetrahedronPairs8) -> Verdict = filter::classify_by_faces
+);
+on_all!(
+    f64: fn classify_tetrahedra(pairs: &TetrahedronPairs8) -> Verdict = filter::classify_tetrahedra
+);
+on_all!(f32: fn classify_in_tables(pairs: &InTables) -> Verdict16 = InTables::classify);
 
 /// Two groups of triangles in f32, and the slots of a batch of pairs.
 struct InTables {
@@ -124,27 +128,6 @@ impl InTables {
     }
 }
 
-fn classify_in_tables(pairs: &InTables) -> Verdict16 {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn avx2(pairs: &InTables) -> Verdict16 {
-        pairs.classify::<number::Avx2F32>()
-    }
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512dq")]
-    fn avx512(pairs: &InTables) -> Verdict16 {
-        pairs.classify::<number::Avx512F32>()
-    }
-    on_all(
-        pairs,
-        InTables::classify::<number::Portable32>,
-        #[cfg(target_arch = "x86_64")]
-        avx2,
-        #[cfg(target_arch = "x86_64")]
-        avx512,
-    )
-}
-
 /// Compares the answers of the filter in f32 with the truth, for many batches. Returns how many
 /// pairs it settled, and how many of these intersect.
 fn check_in_tables(
@@ -170,69 +153,6 @@ fn check_in_tables(
         n_yes += yes.count_ones();
     }
     (n_settled, n_yes)
-}
-
-fn reject_by_planes(pairs: &TrianglePairs8) -> u8 {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn avx2(pairs: &TrianglePairs8) -> u8 {
-        filter::reject_by_planes::<number::Avx2>(pairs)
-    }
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512dq")]
-    fn avx512(pairs: &TrianglePairs8) -> u8 {
-        filter::reject_by_planes::<number::Avx512>(pairs)
-    }
-    on_all(
-        pairs,
-        filter::reject_by_planes::<number::Portable>,
-        #[cfg(target_arch = "x86_64")]
-        avx2,
-        #[cfg(target_arch = "x86_64")]
-        avx512,
-    )
-}
-
-fn classify_by_faces(pairs: &TetrahedronPairs8) -> Verdict {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn avx2(pairs: &TetrahedronPairs8) -> Verdict {
-        filter::classify_by_faces::<number::Avx2>(pairs)
-    }
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512dq")]
-    fn avx512(pairs: &TetrahedronPairs8) -> Verdict {
-        filter::classify_by_faces::<number::Avx512>(pairs)
-    }
-    on_all(
-        pairs,
-        filter::classify_by_faces::<number::Portable>,
-        #[cfg(target_arch = "x86_64")]
-        avx2,
-        #[cfg(target_arch = "x86_64")]
-        avx512,
-    )
-}
-
-fn classify_tetrahedra(pairs: &TetrahedronPairs8) -> Verdict {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn avx2(pairs: &TetrahedronPairs8) -> Verdict {
-        filter::classify_tetrahedra::<number::Avx2>(pairs)
-    }
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512dq")]
-    fn avx512(pairs: &TetrahedronPairs8) -> Verdict {
-        filter::classify_tetrahedra::<number::Avx512>(pairs)
-    }
-    on_all(
-        pairs,
-        filter::classify_tetrahedra::<number::Portable>,
-        #[cfg(target_arch = "x86_64")]
-        avx2,
-        #[cfg(target_arch = "x86_64")]
-        avx512,
-    )
 }
 
 /// The answer for one pair, put into every lane of a batch; `None` when unsure.

@@ -320,7 +320,7 @@ mod tests {
     use crate::distance::filter::part_number;
     use crate::filter::number;
     use crate::filter::{Points8, bounds_and_parts};
-    use crate::tests::Numbers;
+    use crate::tests::{Numbers, on_all};
 
     type Bits = (crate::NearestFeatures, u64, [[u64; 3]; 2]);
 
@@ -338,30 +338,7 @@ mod tests {
             .collect()
     }
 
-    /// What the registers of this processor say, which is the same.
-    fn each_register(pairs: &[PairAtPart]) -> Vec<Bits> {
-        let all = found::<number::Portable>(pairs);
-        #[cfg(target_arch = "x86_64")]
-        {
-            #[target_feature(enable = "avx2")]
-            fn avx2(pairs: &[PairAtPart]) -> Vec<Bits> {
-                found::<number::Avx2>(pairs)
-            }
-            #[target_feature(enable = "avx512f,avx512dq")]
-            fn avx512(pairs: &[PairAtPart]) -> Vec<Bits> {
-                found::<number::Avx512>(pairs)
-            }
-            if is_x86_feature_detected!("avx2") {
-                // SAFETY: just detected.
-                assert_eq!(all, unsafe { avx2(pairs) });
-            }
-            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-                // SAFETY: just detected.
-                assert_eq!(all, unsafe { avx512(pairs) });
-            }
-        }
-        all
-    }
+    on_all!(f64: fn each_register(pairs: &[PairAtPart]) -> Vec<Bits> = found);
 
     /// How many lanes are certain.
     fn n_certain(pairs: &[PairAtPart], n_edges: usize) -> usize {

@@ -6,19 +6,18 @@ use super::filter::{self, Approach};
 use super::moving::first_within_by_roots;
 use super::{Reach, closest_points, gap_below, nearest};
 use crate::filter::{
-    BATCH, Bounded16, Moving64, Near16, SWAPPED_PARTS, TABLE, are_within_in_tables,
-    bounded_in_tables, nearest_in_tables, number, stay_beyond_in_tables, time_between,
+    BATCH, Bounded16, Moving64, Near16, SWAPPED_PARTS, are_within_in_tables, bounded_in_tables,
+    nearest_in_tables, number, stay_beyond_in_tables, time_between,
 };
 use crate::rounding::power_of_two;
-use crate::sweep::tests::{KINDS, Kind, PAIRS, Random, step};
+use crate::sweep::tests::{KINDS, Kind, PAIRS, Random, Step, in_tables, step};
+use crate::tests::on_all;
 use crate::{Contact, ElementPair, Point};
-
-type Step = [[Point; 4]; 2];
 
 /// Sixteen pairs in tables, and what is asked of them.
 struct Asked {
     pair: ElementPair,
-    tables: [Box<Moving64>; 2],
+    tables: [Moving64; 2],
     slots: [u8; BATCH],
     until: f32,
     reach: [f32; 2],
@@ -26,29 +25,10 @@ struct Asked {
 
 impl Asked {
     fn new(pair: ElementPair, steps: &[Step], until: f32, reach: [f32; 2]) -> Self {
-        // Elements at odd slots, in reverse.
-        let slots: [u8; BATCH] = std::array::from_fn(|lane| (2 * (BATCH - lane) - 1) as u8);
-        let table = |points: std::ops::Range<usize>| {
-            let mut table: Box<Moving64> = Box::new([[[[0.0; TABLE]; 3]; 3]; 2]);
-            for (lane, step) in steps.iter().enumerate() {
-                for (end, corners) in table.iter_mut().enumerate() {
-                    for (point, corner) in points.clone().zip(corners) {
-                        for (axis, row) in corner.iter_mut().enumerate() {
-                            row[slots[lane] as usize] = step[end][point][axis] as f32;
-                        }
-                    }
-                }
-            }
-            table
-        };
-        let n = if pair == ElementPair::VertexFace {
-            1
-        } else {
-            2
-        };
+        let (tables, slots) = in_tables(pair, steps);
         Asked {
             pair,
-            tables: [table(0..n), table(n..4)],
+            tables,
             slots,
             until,
             reach,
@@ -58,7 +38,7 @@ impl Asked {
     #[inline(always)]
     fn answer<V: number::Lookup>(&self) -> (Near16, u16, Bounded16) {
         let [a, b] = &self.tables;
-        let (groups, slots) = ([&**a, &**b], [&self.slots; 2]);
+        let (groups, slots) = ([a, b], [&self.slots; 2]);
         let within = are_within_in_tables::<V>(self.pair, groups, slots, self.reach);
         let high = self.reach[1];
         let stay = stay_beyond_in_tables::<V>(self.pair, groups, slots, self.until, high);
@@ -78,36 +58,9 @@ impl Asked {
         }
         (near, stay, bounded)
     }
-
-    /// The answer of all instruction sets of this processor, which must be the same.
-    fn answer_of_all(&self) -> (Near16, u16, Bounded16) {
-        let answer = self.answer::<number::Portable32>();
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx2") {
-                // SAFETY: just detected.
-                assert_eq!(answer, unsafe { answer_avx2(self) });
-            }
-            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-                // SAFETY: just detected.
-                assert_eq!(answer, unsafe { answer_avx512(self) });
-            }
-        }
-        answer
-    }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn answer_avx2(asked: &Asked) -> (Near16, u16, Bounded16) {
-    asked.answer::<number::Avx2F32>()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq")]
-fn answer_avx512(asked: &Asked) -> (Near16, u16, Bounded16) {
-    asked.answer::<number::Avx512F32>()
-}
+on_all!(f32: fn answer_of_all(asked: &Asked) -> (Near16, u16, Bounded16) = Asked::answer);
 
 /// A distance that some of the elements have at the start or at the end, or one next to it, or
 /// another one.
@@ -142,7 +95,7 @@ fn filters_never_contradict_integers_and_roots() {
                 let d = distance(pair, &steps, kind, &mut random);
                 let reach = Reach::from(d);
                 let asked = Asked::new(pair, &steps, until as f32, reach.enclosing_f32());
-                let (near, stay, bounded) = asked.answer_of_all();
+                let (near, stay, bounded) = answer_of_all(&asked);
                 let within = near.verdict;
                 assert_eq!(within.yes & within.no, 0);
                 for (lane, [start, end]) in steps.iter().enumerate() {
@@ -260,7 +213,7 @@ fn nearest_parts_by_certain_signs_are_those_of_integers() {
                 }
                 // All pairs in range are near.
                 let asked = Asked::new(pair, &steps, 1.0, [1e4; 2]);
-                let (near, _, _) = asked.answer_of_all();
+                let (near, _, _) = answer_of_all(&asked);
                 for (lane, [start, _]) in steps.iter().enumerate() {
                     let case = || format!("{kind:?} {pair:?} {start:?}");
                     let expected = exact_part(pair, start);
@@ -422,7 +375,7 @@ fn numbers_that_are_none_are_unsure() {
         });
         for pair in PAIRS {
             let asked = Asked::new(pair, &steps, 1.0, [0.1, 0.1]);
-            let (near, stay, _) = asked.answer_of_all();
+            let (near, stay, _) = answer_of_all(&asked);
             let within = near.verdict;
             assert_eq!(stay, 0, "{x} {pair:?}");
             // The elements of odd lanes are finite at the start.

@@ -1,6 +1,5 @@
 use super::*;
-use crate::filter::number;
-use crate::tests::Numbers;
+use crate::tests::{Numbers, on_all};
 use crate::triangle::segment_meets_triangle;
 
 impl Numbers {
@@ -177,30 +176,9 @@ fn of_any_size() {
     assert!(meet(&behind, &[]).is_none());
 }
 
-/// What the registers of this processor say, which is the same.
-fn each_register(batch: &[(Ray, [Point; 3])]) -> [Option<(f64, [f64; 3])>; LANES] {
-    let found = meet_inside::<number::Portable>(batch);
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2")]
-        fn avx2(batch: &[(Ray, [Point; 3])]) -> [Option<(f64, [f64; 3])>; LANES] {
-            meet_inside::<number::Avx2>(batch)
-        }
-        #[target_feature(enable = "avx512f,avx512dq")]
-        fn avx512(batch: &[(Ray, [Point; 3])]) -> [Option<(f64, [f64; 3])>; LANES] {
-            meet_inside::<number::Avx512>(batch)
-        }
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: just detected.
-            assert_eq!(found, unsafe { avx2(batch) });
-        }
-        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-            // SAFETY: just detected.
-            assert_eq!(found, unsafe { avx512(batch) });
-        }
-    }
-    found
-}
+/// Entries and barycentrics.
+type Inside = [Option<(f64, [f64; 3])>; LANES];
+on_all!(f64: fn each_register(batch: &[(Ray, [Point; 3])]) -> Inside = meet_inside);
 
 /// What floats say of rays through faces is what integers say, where they say anything.
 #[test]

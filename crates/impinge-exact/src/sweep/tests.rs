@@ -7,8 +7,12 @@ use crate::filter::{
     self, BATCH, LANES, Moving64, Next, Search, Spans8, Steps8, TABLE, contact_answer, number,
     time_between,
 };
+use crate::tests::on_all;
 
 pub(crate) const PAIRS: [ElementPair; 2] = [ElementPair::VertexFace, ElementPair::EdgeEdge];
+
+/// The corners of both elements at the start and at the end.
+pub(crate) type Step = [[Point; 4]; 2];
 
 pub(crate) struct Random(pub u64);
 
@@ -63,7 +67,7 @@ fn narrow(x: f64) -> f64 {
 }
 
 /// A step whose coordinates are `f32`.
-pub(crate) fn step(kind: Kind, random: &mut Random) -> [[Point; 4]; 2] {
+pub(crate) fn step(kind: Kind, random: &mut Random) -> Step {
     let mut points = [[[0.0; 3]; 4]; 2];
     let axes = [[(); 3]; 3].map(|axis| axis.map(|()| random.unit()));
     let scale = 2.0_f64.powi(random.below(160) as i32 - 120);
@@ -97,7 +101,7 @@ pub(crate) fn step(kind: Kind, random: &mut Random) -> [[Point; 4]; 2] {
 }
 
 impl Steps8 {
-    fn set(&mut self, lane: usize, step: &[[Point; 4]; 2]) {
+    fn set(&mut self, lane: usize, step: &Step) {
         let lists = self.0.as_flattened_mut().as_flattened_mut();
         for (list, x) in lists.iter_mut().zip(step.as_flattened().as_flattened()) {
             list[lane] = *x;
@@ -158,45 +162,12 @@ fn ask<V: number::Vector>(pair: ElementPair, steps: &Steps8, (until, margin): Wi
     (apart, outcomes)
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn ask_avx2(pair: ElementPair, steps: &Steps8, within: Within) -> Answer {
-    ask::<number::Avx2>(pair, steps, within)
-}
+on_all!(f64: fn ask_all(pair: ElementPair, steps: &Steps8, within: Within) -> Answer = ask);
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq")]
-fn ask_avx512(pair: ElementPair, steps: &Steps8, within: Within) -> Answer {
-    ask::<number::Avx512>(pair, steps, within)
-}
-
-/// The answer of all instruction sets of this processor, which must be the same.
-fn ask_all(pair: ElementPair, steps: &Steps8, within: Within) -> Answer {
-    let answer = ask::<number::Portable>(pair, steps, within);
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: just detected.
-            assert_eq!(answer, unsafe { ask_avx2(pair, steps, within) });
-        }
-        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-            // SAFETY: just detected.
-            assert_eq!(answer, unsafe { ask_avx512(pair, steps, within) });
-        }
-    }
-    answer
-}
-
-/// The same pairs in tables, in `f32`: which are apart.
-#[inline(always)]
-fn ask_tables<V: number::Lookup>(
-    pair: ElementPair,
-    steps: &[[[Point; 4]; 2]],
-    within: (f32, f64),
-) -> u16 {
+/// Pairs in tables, in `f32`, and their slots.
+pub(crate) fn in_tables(pair: ElementPair, steps: &[Step]) -> ([Moving64; 2], [u8; BATCH]) {
     // Elements at odd slots, in reverse.
-    let slot = |lane: usize| (2 * (BATCH - lane) - 1) as u8;
-    let slots: [u8; BATCH] = std::array::from_fn(slot);
+    let slots: [u8; BATCH] = std::array::from_fn(|lane| (2 * (BATCH - lane) - 1) as u8);
     let table = |points: std::ops::Range<usize>| {
         let mut table: Moving64 = [[[[0.0; TABLE]; 3]; 3]; 2];
         for (lane, step) in steps.iter().enumerate() {
@@ -210,43 +181,24 @@ fn ask_tables<V: number::Lookup>(
         }
         table
     };
-    let [a, b] = match pair {
-        ElementPair::VertexFace => [table(0..1), table(1..4)],
-        _ => [table(0..2), table(2..4)],
-    };
+    let n = pair.n_first();
+    ([table(0..n), table(n..4)], slots)
+}
+
+/// The same pairs in tables: which are apart.
+#[inline(always)]
+fn ask_tables<V: number::Lookup>(pair: ElementPair, steps: &[Step], within: (f32, f64)) -> u16 {
+    let ([a, b], slots) = in_tables(pair, steps);
     let (tables, slots) = ([&a, &b], [&slots, &slots]);
     filter::are_far_in_tables::<V>(pair, tables, slots, within)
         | filter::are_across_in_tables::<V>(pair, tables, slots, within)
         | filter::are_aside_in_tables::<V>(pair, tables, slots, within)
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn ask_tables_avx2(pair: ElementPair, steps: &[[[Point; 4]; 2]], within: (f32, f64)) -> u16 {
-    ask_tables::<number::Avx2F32>(pair, steps, within)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq")]
-fn ask_tables_avx512(pair: ElementPair, steps: &[[[Point; 4]; 2]], within: (f32, f64)) -> u16 {
-    ask_tables::<number::Avx512F32>(pair, steps, within)
-}
-
-fn ask_all_tables(pair: ElementPair, steps: &[[[Point; 4]; 2]], within: (f32, f64)) -> u16 {
-    let answer = ask_tables::<number::Portable32>(pair, steps, within);
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: just detected.
-            assert_eq!(answer, unsafe { ask_tables_avx2(pair, steps, within) });
-        }
-        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-            // SAFETY: just detected.
-            assert_eq!(answer, unsafe { ask_tables_avx512(pair, steps, within) });
-        }
-    }
-    answer
-}
+on_all!(
+    f32: fn ask_all_tables(pair: ElementPair, steps: &[Step], within: (f32, f64)) -> u16
+        = ask_tables
+);
 
 /// Whether a contact comes at `until` or earlier.
 fn is_in_time(contact: Option<Contact>, until: f64) -> bool {
@@ -424,7 +376,7 @@ fn filter_does_not_trust_the_rounding_error_of_an_area() {
 /// The first point, and of two edges the second with it, moves through the middle of the edge
 /// between two others, at time 1/2, in the plane of that edge and the normal. Coordinates are whole
 /// numbers below 2^53, and areas are not.
-fn meeting_at_a_border(pair: ElementPair, random: &mut Random) -> [[Point; 4]; 2] {
+fn meeting_at_a_border(pair: ElementPair, random: &mut Random) -> Step {
     let mut corner = || [(); 3].map(|()| 2.0 * random.below(1 << 13) as f64);
     let (start, end, third) = (corner(), corner(), corner());
     let edge: Point = std::array::from_fn(|k| end[k] - start[k]);
