@@ -31,6 +31,13 @@ impl Caller {
         Detector::new(settings.on_device(device, queue)).expect("settings")
     }
 
+    /// A detector that has a line of a kernel replaced: the kernel, the line, and what is there
+    /// instead.
+    pub fn damaged(&self, settings: Settings, damage: (&str, &str, &str)) -> Detector {
+        let (device, queue) = (self.device.clone(), self.queue.clone());
+        Detector::with_damage(device, queue, settings, damage).expect("the kernel has this line")
+    }
+
     pub fn encoder(&self) -> wgpu::CommandEncoder {
         self.device.create_command_encoder(&Default::default())
     }

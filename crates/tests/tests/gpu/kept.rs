@@ -282,10 +282,7 @@ fn damaged_kernels_of_distances_that_are_kept_are_noticed() {
         })
     };
     assert!(holds(&|| caller.detector(Settings::default())));
-    let damaged = |damage| {
-        let (device, queue) = (caller.device.clone(), caller.queue.clone());
-        Detector::with_damage(device, queue, Settings::default(), damage).expect("a line")
-    };
+    let damaged = |damage| caller.damaged(Settings::default(), damage);
     // A guess that goes too far is no harm: it is checked.
     let too_far = (
         "narrow_keep",

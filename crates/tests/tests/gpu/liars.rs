@@ -1,18 +1,11 @@
 //! Proof that the comparison with the oracle can fail: the GPU's answers are falsified, and its
 //! kernels damaged.
 
-use impinge_core::{
-    Backend, Detector, Method, Query, Scene, Settings, SharedVertex, hash_rows, wgpu,
-};
+use crate::caller::Caller;
+
+use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, SharedVertex, hash_rows};
 use impinge_scenes::{soup, surfaces};
 use impinge_tests::{Case, agree, cases, naive, rows};
-
-fn device() -> (wgpu::Device, wgpu::Queue) {
-    let instance = wgpu::Instance::default();
-    let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
-    let adapter = adapter.expect("these tests need an adapter");
-    pollster::block_on(adapter.request_device(&Default::default())).unwrap()
-}
 
 #[test]
 fn answers_tampered_with_are_caught() {
@@ -213,8 +206,7 @@ fn questions() -> Vec<(Case, Vec<[u32; 4]>)> {
 
 /// Whether a damaged backend answers a question wrongly or not at all.
 fn is_caught(settings: &Settings, damage: Damage, questions: &[(Case, Vec<[u32; 4]>)]) -> bool {
-    let (device, queue) = device();
-    let mut detector = Detector::with_damage(device, queue, settings.clone(), damage).unwrap();
+    let mut detector = Caller::new().damaged(settings.clone(), damage);
     questions.iter().any(|(case, truth)| {
         let pairs = detector.detect(&case.scene, &case.query);
         pairs.is_err()

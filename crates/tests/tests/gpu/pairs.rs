@@ -5,6 +5,7 @@
 use std::future::Future;
 use std::sync::{Mutex, OnceLock};
 
+use crate::caller::Caller;
 use crate::stages::{STAGES, Shrink};
 use impinge_core::{
     Backend, Capacities, Detector, Error, Method, Query, Recluster, Scene, Settings, SharedVertex,
@@ -662,33 +663,9 @@ fn many_small_bodies_meet_through_the_tree_over_bodies() {
     check(&case, &expected, gpu(Method::Cells));
 }
 
-/// Words of a buffer on the device.
-fn read(device: &wgpu::Device, queue: &wgpu::Queue, buffer: &wgpu::Buffer) -> Vec<u32> {
-    let staging = device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: buffer.size(),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.create_command_encoder(&Default::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
-    queue.submit([encoder.finish()]);
-    staging.map_async(wgpu::MapMode::Read, .., |_| ());
-    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
-    let view = staging.get_mapped_range(..).unwrap();
-    let words = view.chunks_exact(4);
-    words
-        .map(|word| u32::from_le_bytes(word.try_into().unwrap()))
-        .collect()
-}
-
 #[test]
 fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
-    let instance = wgpu::Instance::default();
-    let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
-    let adapter = adapter.expect("these tests need an adapter");
-    let device = pollster::block_on(adapter.request_device(&Default::default()));
-    let (device, queue) = device.unwrap();
+    let caller = Caller::new();
     let ball = surfaces::bumpy_ball(1500, 0.2);
     let moved = ball.translated([0.3, 0.1, 0.0]);
     // The scene has the rest pose; only the device has the second ball's real positions.
@@ -712,37 +689,31 @@ fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
         .flatten()
         .flat_map(|x| x.to_le_bytes())
         .collect();
-    let positions = device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: bytes.len() as u64,
-        usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    queue.write_buffer(&positions, 0, &bytes);
+    let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+    let positions = caller.buffer(bytes.len() as u64, usage);
+    caller.queue.write_buffer(&positions, 0, &bytes);
     for method in [Method::Clusters, Method::Cells] {
-        let settings = gpu(method);
-        let mut detector =
-            Detector::new(settings.on_device(device.clone(), queue.clone())).unwrap();
+        let mut detector = caller.detector(gpu(method));
         let mut n_tries = 0;
         let found = loop {
-            let mut encoder = device.create_command_encoder(&Default::default());
+            let mut encoder = caller.encoder();
             let resident = [(b, &positions)];
             let found =
                 detector
                     .gpu()
                     .expect("a device")
                     .encode(&scene, &query, &resident, &mut encoder);
-            queue.submit([encoder.finish()]);
+            caller.queue.submit([encoder.finish()]);
             n_tries += 1;
             if detector.gpu().expect("a device").grow().unwrap() {
                 break found.unwrap();
             }
             assert!(n_tries < 9);
         };
-        let counts = read(&device, &queue, &found.counts);
+        let counts = caller.read(&found.counts);
         let keys = |buffer: &wgpu::Buffer, offset: u64| -> Vec<[u32; 2]> {
             let n = counts[offset as usize / 4] as usize;
-            let words = read(&device, &queue, buffer);
+            let words = caller.read(buffer);
             words.as_chunks::<2>().0[..n].to_vec()
         };
         let mut pairs = keys(&found.pairs, found.n_pairs_offset);
@@ -758,7 +729,7 @@ fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
         // Where they can be drawn from, until the body moves.
         for (id, model) in [(a, &ball), (b, &moved)] {
             let (buffer, offset) = detector.gpu().unwrap().positions(&truth, id).unwrap();
-            let words = read(&device, &queue, &buffer);
+            let words = caller.read(&buffer);
             let (first, n) = (offset as usize / 4, 3 * model.positions.len());
             let there: Vec<f32> = words[first..first + n]
                 .iter()
@@ -768,13 +739,8 @@ fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
         }
         assert!(detector.gpu().unwrap().positions(&scene, b).is_none());
         assert!(oracle.gpu().is_none());
-        let small = device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: 12,
-            usage: wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        let mut encoder = device.create_command_encoder(&Default::default());
+        let small = caller.buffer(12, wgpu::BufferUsages::COPY_SRC);
+        let mut encoder = caller.encoder();
         let refused =
             detector
                 .gpu()
@@ -786,11 +752,7 @@ fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
 
 #[test]
 fn a_lost_device_is_an_error_and_a_new_detector_works() {
-    let instance = wgpu::Instance::default();
-    let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
-    let adapter = adapter.expect("these tests need an adapter");
-    let device = pollster::block_on(adapter.request_device(&Default::default()));
-    let (device, queue) = device.unwrap();
+    let Caller { device, queue } = Caller::new();
     let case = cases().swap_remove(0);
     let settings = gpu(Method::Clusters);
     let on_device = settings.clone().on_device(device.clone(), queue);

@@ -1,15 +1,10 @@
 //! Passes as data: printed, and run launch by launch, which finds the kernel that goes wrong.
 
-use impinge_core::gpu::recording::Ran;
-use impinge_core::{Backend, BodyId, Detector, Method, Positions, Query, Scene, Settings, wgpu};
-use impinge_scenes::{Random, soup, surfaces};
+use crate::caller::Caller;
 
-fn device() -> (wgpu::Device, wgpu::Queue) {
-    let instance = wgpu::Instance::default();
-    let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
-    let adapter = adapter.expect("these tests need an adapter");
-    pollster::block_on(adapter.request_device(&Default::default())).expect("a device")
-}
+use impinge_core::gpu::recording::Ran;
+use impinge_core::{Backend, BodyId, Detector, Method, Positions, Query, Scene, Settings};
+use impinge_scenes::{Random, soup, surfaces};
 
 /// Two balls that overlap, of which one moves.
 fn balls() -> Scene {
@@ -40,9 +35,7 @@ fn first_wrong(settings: &Settings, ask: Ask, damage: (&str, &str, &str)) -> Opt
     let scene = balls();
     let harmless = (damage.0, damage.1, damage.1);
     let [good, bad] = [harmless, damage].map(|damage| {
-        let (device, queue) = device();
-        let mut detector = Detector::with_damage(device, queue, settings.clone(), damage)
-            .expect("the kernel has this line");
+        let mut detector = Caller::new().damaged(settings.clone(), damage);
         detector.trace(true);
         ask(&mut detector, &scene);
         detector

@@ -5,6 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::caller::Caller;
+use crate::steps::{faces, lattice};
 
 use impinge_core::{
     Backend, BodyId, Candidates, Detector, Element, Error, Exclusion, PairKind, Part, Query,
@@ -237,20 +238,6 @@ fn pairs_that_may_touch_stay_on_the_device() {
     assert_between("still", &found, &pairs, &still, &step, &query);
 }
 
-/// Points of a lattice of n^3 cells.
-fn lattice(random: &mut Random, n_points: usize, n: u32) -> Vec<[f32; 3]> {
-    let mut at = || random.below(n + 1) as f32;
-    (0..n_points).map(|_| [at(), at(), at()]).collect()
-}
-
-/// Triangles that share some of their vertices.
-fn faces(n_points: usize) -> Vec<[u32; 3]> {
-    let n = n_points as u32;
-    (0..n / 3)
-        .map(|f| [3 * f, 3 * f + 1, (3 * f + 5) % n])
-        .collect()
-}
-
 #[test]
 fn numbers_name_elements_of_every_kind_of_body() {
     let caller = Caller::new();
@@ -326,9 +313,9 @@ fn lists_that_are_too_small_grow() {
     let n = 600;
     let mut scene = Scene::new();
     let body = scene
-        .add((faces(n), lattice(&mut random, n, 9)))
+        .add((faces(n), lattice::<f32>(&mut random, n, 9)))
         .expect("good");
-    let end = lattice(&mut random, n, 9);
+    let end = lattice::<f32>(&mut random, n, 9);
     scene.set_end_positions(body, &end).expect("good");
     let (step, none): (_, [&[_]; 2]) = (Query::all(), [&[], &[]]);
     let mut detector = caller.detector(Settings::default());
@@ -577,11 +564,9 @@ fn damaged_names_are_noticed() {
         ("time_of(bracket.touches_by)", "2.0"),
         ("time_of(bracket.free_until)", "0.0"),
     ] {
-        let (device, queue) = (caller.device.clone(), caller.queue.clone());
         let damage = ("narrow_search", line, damaged);
-        let detector = Detector::with_damage(device, queue, Settings::default(), damage);
         let mut encoder = caller.encoder();
-        let mut detector = detector.expect("a line");
+        let mut detector = caller.damaged(Settings::default(), damage);
         let found =
             detector
                 .gpu()

@@ -4,9 +4,11 @@
 
 use std::sync::{Mutex, OnceLock};
 
+use crate::caller::Caller;
+
 use impinge_core::{
     Backend, BodyId, CancelToken, Capacities, Clearance, Control, Detector, Error, Impact, Method,
-    PairKind, Precision, Query, Real, Recluster, Scene, Settings, Start, wgpu,
+    PairKind, Precision, Query, Real, Recluster, Scene, Settings, Start,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
 
@@ -51,13 +53,13 @@ pub fn assert_alike(name: &str, device: &mut Detector, scene: &Scene, step: &Que
 }
 
 /// Points of a lattice of n^3 cells.
-fn lattice<R: From<f32>>(random: &mut Random, n_points: usize, n: u32) -> Vec<[R; 3]> {
+pub fn lattice<R: From<f32>>(random: &mut Random, n_points: usize, n: u32) -> Vec<[R; 3]> {
     let mut at = || R::from(random.below(n + 1) as f32);
     (0..n_points).map(|_| [at(), at(), at()]).collect()
 }
 
 /// Triangles that share some of their vertices.
-fn faces(n_points: usize) -> Vec<[u32; 3]> {
+pub fn faces(n_points: usize) -> Vec<[u32; 3]> {
     let n = n_points as u32;
     (0..n / 3)
         .map(|f| [3 * f, 3 * f + 1, (3 * f + 5) % n])
@@ -180,6 +182,16 @@ fn several_bodies_meet_as_the_query_and_their_filters_say() {
     assert!(counts.len() > 9, "the questions differ: {counts:?}");
 }
 
+/// Adds points and edges of a tiny lattice, so that they meet.
+fn add_points_and_edges<R: Real + From<f32>>(scene: &mut Scene, random: &mut Random) {
+    let edges = Vec::from_iter((0..39).step_by(2).map(|v| [v, (v + 3) % 40]));
+    let mut points = || lattice::<R>(random, 40, 3);
+    let body = scene.add_points(&points()).expect("good");
+    scene.set_end_positions(body, points()).expect("good");
+    let body = scene.add_edges(&edges, &points()).expect("good");
+    scene.set_end_positions(body, points()).expect("good");
+}
+
 #[test]
 fn edges_and_points_are_answered_alike() {
     let mut device = on_gpu();
@@ -187,35 +199,8 @@ fn edges_and_points_are_answered_alike() {
     for seed in 0..6 {
         let mut random = Random::new(200 + seed);
         let mut scene = Scene::new();
-        // Points and edges of a tiny lattice, so that they meet.
-        for is_double in [false, true] {
-            let n = 40;
-            let edges: Vec<[u32; 2]> = (0..n - 1).step_by(2).map(|v| [v, (v + 3) % n]).collect();
-            let n = n as usize;
-            if is_double {
-                let points = scene
-                    .add_points(&lattice::<f64>(&mut random, n, 3))
-                    .expect("good");
-                let end = lattice::<f64>(&mut random, n, 3);
-                scene.set_end_positions(points, &end).expect("good");
-                let hair = scene.add_edges(&edges, &lattice::<f64>(&mut random, n, 3));
-                let end = lattice::<f64>(&mut random, n, 3);
-                scene
-                    .set_end_positions(hair.expect("good"), &end)
-                    .expect("good");
-            } else {
-                let points = scene
-                    .add_points(&lattice::<f32>(&mut random, n, 3))
-                    .expect("good");
-                let end = lattice::<f32>(&mut random, n, 3);
-                scene.set_end_positions(points, &end).expect("good");
-                let hair = scene.add_edges(&edges, &lattice::<f32>(&mut random, n, 3));
-                let end = lattice::<f32>(&mut random, n, 3);
-                scene
-                    .set_end_positions(hair.expect("good"), &end)
-                    .expect("good");
-            }
-        }
+        add_points_and_edges::<f32>(&mut scene, &mut random);
+        add_points_and_edges::<f64>(&mut scene, &mut random);
         add_web::<f32>(&mut scene, &mut random, 30, 3);
         for query in [Query::all(), Query::between_all(), Query::self_all()] {
             let name = format!("bare {seed} {query:?}");
@@ -736,21 +721,12 @@ fn threads_and_methods_do_not_matter() {
     }
 }
 
-fn device() -> (wgpu::Device, wgpu::Queue) {
-    let instance = wgpu::Instance::default();
-    let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
-    let adapter = adapter.expect("these tests need an adapter");
-    pollster::block_on(adapter.request_device(&Default::default())).expect("a device")
-}
-
 /// The hash of a step's impacts, the earliest one, and whether there is none.
 type Answers = Result<(u64, Option<Impact>, bool), Error>;
 
 /// Whether a device, one line of whose kernels is replaced, answers about some step wrongly.
 fn is_noticed(steps: &[(Scene, Query, Answers)], damage: (&str, &str, &str)) -> bool {
-    let (open, queue) = device();
-    let device = Detector::with_damage(open, queue, Settings::default(), damage);
-    let mut device = device.expect("a line");
+    let mut device = Caller::new().damaged(Settings::default(), damage);
     let mut steps = steps.iter();
     steps.any(|(scene, step, truth)| answers(&mut device, scene, step) != *truth)
 }
