@@ -4,8 +4,7 @@
 use crate::elements;
 use impinge_core::exact::internal::{Meeting, Ray, meet};
 use impinge_core::{
-    Backend, BodyId, CancelToken, Control, Detector, Error, Hit, Hits, InstructionSet, Query,
-    RayHit, Scene, Settings,
+    Backend, BodyId, CancelToken, Control, Detector, Error, Hit, Hits, Query, RayHit, Scene,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
 
@@ -186,38 +185,29 @@ fn every_way_gives_the_same_answer() {
     for hits in Hit::ALL {
         let query = Query::all().hits(hits);
         let mut known: Option<Hits> = None;
-        for instruction_set in InstructionSet::ALL {
-            for threads in [1, 4] {
-                let mut detector = Detector::new(
-                    Settings::new()
-                        .instruction_set(instruction_set)
-                        .threads(threads)
-                        .backend(Backend::Cpu),
-                )
+        for (threads, mut detector) in crate::detectors() {
+            let most = f64::INFINITY;
+            let mut moving = scene.clone();
+            let narrow = detector
+                .cast(&moving, &origins, &directions, most, &query)
                 .unwrap();
-                let most = f64::INFINITY;
-                let mut moving = scene.clone();
-                let narrow = detector
-                    .cast(&moving, &origins, &directions, most, &query)
-                    .unwrap();
-                let of_wide = detector
-                    .cast(&moving, &wide[0], &wide[1], most, &query)
-                    .unwrap();
-                moving.set_positions(body, &moved).unwrap();
-                let of_turned = detector
-                    .cast(&moving, &turned[0], &turned[1], most, &query)
-                    .unwrap();
-                let known = known.get_or_insert_with(|| narrow.clone());
-                for other in [&narrow, &of_wide, &of_turned] {
-                    assert!(known.iter().eq(other.iter()));
-                    assert_eq!(
-                        (known.offsets(), known.is_hit()),
-                        (other.offsets(), other.is_hit())
-                    );
-                    assert_eq!(known.hash(), other.hash());
-                }
-                assert_eq!(narrow.stats().n_threads, threads);
+            let of_wide = detector
+                .cast(&moving, &wide[0], &wide[1], most, &query)
+                .unwrap();
+            moving.set_positions(body, &moved).unwrap();
+            let of_turned = detector
+                .cast(&moving, &turned[0], &turned[1], most, &query)
+                .unwrap();
+            let known = known.get_or_insert_with(|| narrow.clone());
+            for other in [&narrow, &of_wide, &of_turned] {
+                assert!(known.iter().eq(other.iter()));
+                assert_eq!(
+                    (known.offsets(), known.is_hit()),
+                    (other.offsets(), other.is_hit())
+                );
+                assert_eq!(known.hash(), other.hash());
             }
+            assert_eq!(narrow.stats().n_threads, threads);
         }
         let known = known.unwrap();
         let n = known.is_hit().iter().filter(|&&is| is).count();

@@ -4,8 +4,8 @@ use crate::elements;
 use crate::oracle::{self, Fraction, Vector};
 use impinge_core::exact::Feature;
 use impinge_core::{
-    Backend, CancelToken, Closest, Control, Detector, Elements, Error, Exclusion, InstructionSet,
-    PairFilter, Query, Scene, Settings,
+    Backend, CancelToken, Closest, Control, Detector, Elements, Error, Exclusion, PairFilter,
+    Query, Scene,
 };
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
 
@@ -300,28 +300,19 @@ fn several_nearest_are_the_same_in_every_way() {
     let reversed: Vec<[f32; 3]> = points.iter().rev().copied().collect();
     let query = Query::all().n_nearest(6);
     let mut first: Option<Closest> = None;
-    for instruction_set in InstructionSet::ALL {
-        for threads in [1, 4] {
-            let mut detector = Detector::new(
-                Settings::new()
-                    .instruction_set(instruction_set)
-                    .threads(threads)
-                    .backend(Backend::Cpu),
-            )
-            .unwrap();
-            let mut ask = |points: &[[f32; 3]]| {
-                detector
-                    .closest(&scene, points, f64::INFINITY, &query)
-                    .unwrap()
-            };
-            let closest = ask(&points);
-            let backwards = ask(&reversed);
-            let last = points.len() - 1;
-            assert!((0..=last).all(|ix| closest.of(ix).eq(backwards.of(last - ix))));
-            let first = first.get_or_insert_with(|| closest.clone());
-            assert!(first.iter().eq(closest.iter()));
-            assert_eq!(first.hash(), closest.hash());
-        }
+    for (_, mut detector) in crate::detectors() {
+        let mut ask = |points: &[[f32; 3]]| {
+            detector
+                .closest(&scene, points, f64::INFINITY, &query)
+                .unwrap()
+        };
+        let closest = ask(&points);
+        let backwards = ask(&reversed);
+        let last = points.len() - 1;
+        assert!((0..=last).all(|ix| closest.of(ix).eq(backwards.of(last - ix))));
+        let first = first.get_or_insert_with(|| closest.clone());
+        assert!(first.iter().eq(closest.iter()));
+        assert_eq!(first.hash(), closest.hash());
     }
 }
 
@@ -421,38 +412,29 @@ fn every_way_gives_the_same_answer() {
     let body = model.add_to(&mut scene).unwrap();
     let moved: Vec<[f32; 3]> = model.positions.iter().map(|&[x, y, z]| [y, z, x]).collect();
     let mut first: Option<Closest> = None;
-    for instruction_set in InstructionSet::ALL {
-        for threads in [1, 4] {
-            let mut detector = Detector::new(
-                Settings::new()
-                    .instruction_set(instruction_set)
-                    .threads(threads)
-                    .backend(Backend::Cpu),
-            )
+    for (threads, mut detector) in crate::detectors() {
+        let query = Query::all();
+        let mut ask = |scene: &Scene, points: &[[f32; 3]]| {
+            detector
+                .closest(scene, points, f64::INFINITY, &query)
+                .unwrap()
+        };
+        let mut moving = scene.clone();
+        let closest = ask(&moving, &points);
+        assert_eq!(closest.stats().n_threads, threads);
+        let backwards = ask(&moving, &reversed);
+        assert!(backwards.iter().rev().eq(closest.iter()));
+        moving.set_positions(body, &moved).unwrap();
+        let turned: Vec<[f32; 3]> = points.iter().map(|&[x, y, z]| [y, z, x]).collect();
+        let turned = ask(&moving, &turned);
+        assert!(turned.rows().eq(closest.rows()));
+        let of_wide = detector
+            .closest(&scene, &wide, f64::INFINITY, &query)
             .unwrap();
-            let query = Query::all();
-            let mut ask = |scene: &Scene, points: &[[f32; 3]]| {
-                detector
-                    .closest(scene, points, f64::INFINITY, &query)
-                    .unwrap()
-            };
-            let mut moving = scene.clone();
-            let closest = ask(&moving, &points);
-            assert_eq!(closest.stats().n_threads, threads);
-            let backwards = ask(&moving, &reversed);
-            assert!(backwards.iter().rev().eq(closest.iter()));
-            moving.set_positions(body, &moved).unwrap();
-            let turned: Vec<[f32; 3]> = points.iter().map(|&[x, y, z]| [y, z, x]).collect();
-            let turned = ask(&moving, &turned);
-            assert!(turned.rows().eq(closest.rows()));
-            let of_wide = detector
-                .closest(&scene, &wide, f64::INFINITY, &query)
-                .unwrap();
-            assert!(of_wide.iter().eq(closest.iter()));
-            let first = first.get_or_insert_with(|| closest.clone());
-            assert!(first.iter().eq(closest.iter()));
-            assert_eq!(first.hash(), closest.hash());
-        }
+        assert!(of_wide.iter().eq(closest.iter()));
+        let first = first.get_or_insert_with(|| closest.clone());
+        assert!(first.iter().eq(closest.iter()));
+        assert_eq!(first.hash(), closest.hash());
     }
 }
 

@@ -5,8 +5,7 @@ use std::collections::HashMap;
 
 use crate::oracle::{self, Vector, Whole};
 use impinge_core::{
-    Backend, CancelToken, Control, Detector, Elements, Error, InstructionSet, Query, Scene,
-    Settings,
+    Backend, CancelToken, Control, Detector, Elements, Error, Query, Scene, Settings,
 };
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
 
@@ -328,24 +327,15 @@ fn every_way_gives_the_same_answer() {
     let body = model.add_to(&mut scene).unwrap();
     let moved: Vec<[f32; 3]> = model.positions.iter().map(|&[x, y, z]| [y, z, x]).collect();
     let mut answers = Vec::new();
-    for instruction_set in InstructionSet::ALL {
-        for threads in [1, 4] {
-            let mut detector = Detector::new(
-                Settings::new()
-                    .instruction_set(instruction_set)
-                    .threads(threads)
-                    .backend(Backend::Cpu),
-            )
-            .unwrap();
-            let mut moving = scene.clone();
-            let first = detector.contains(&moving, body, &points).unwrap();
-            assert_eq!(first, detector.contains(&moving, body, &wide).unwrap());
-            moving.set_positions(body, &moved).unwrap();
-            let turned: Vec<[f32; 3]> = points.iter().map(|&[x, y, z]| [y, z, x]).collect();
-            assert_eq!(first, detector.contains(&moving, body, &turned).unwrap());
-            assert_eq!(detector.stats().n_threads, threads);
-            answers.push(first);
-        }
+    for (threads, mut detector) in crate::detectors() {
+        let mut moving = scene.clone();
+        let first = detector.contains(&moving, body, &points).unwrap();
+        assert_eq!(first, detector.contains(&moving, body, &wide).unwrap());
+        moving.set_positions(body, &moved).unwrap();
+        let turned: Vec<[f32; 3]> = points.iter().map(|&[x, y, z]| [y, z, x]).collect();
+        assert_eq!(first, detector.contains(&moving, body, &turned).unwrap());
+        assert_eq!(detector.stats().n_threads, threads);
+        answers.push(first);
     }
     assert!(answers.iter().all(|answer| *answer == answers[0]));
     assert!(count(&answers[0])[2] > 100);
@@ -573,24 +563,17 @@ fn the_tetrahedron_of_a_point() {
             counts[holding.len().min(2)] += 1;
         }
         let expected: Vec<Option<u32>> = all.iter().map(|of| of.first().copied()).collect();
-        for instruction_set in InstructionSet::ALL {
-            for threads in [1, 3] {
-                let settings = Settings::new()
-                    .instruction_set(instruction_set)
-                    .threads(threads)
-                    .backend(Backend::Cpu);
-                let mut detector = Detector::new(settings).unwrap();
-                let found = detector.locate(&scene, body, points).unwrap();
-                assert_eq!(found, expected);
-                // Inside and on the surface is in one, and outside in none.
-                let places = detector.contains(&scene, body, points).unwrap();
-                assert!(
-                    places
-                        .iter()
-                        .map(|&x| x >= 0)
-                        .eq(found.iter().map(Option::is_some))
-                );
-            }
+        for (_, mut detector) in crate::detectors() {
+            let found = detector.locate(&scene, body, points).unwrap();
+            assert_eq!(found, expected);
+            // Inside and on the surface is in one, and outside in none.
+            let places = detector.contains(&scene, body, points).unwrap();
+            assert!(
+                places
+                    .iter()
+                    .map(|&x| x >= 0)
+                    .eq(found.iter().map(Option::is_some))
+            );
         }
     };
     for (n, k) in [(1, 1), (20, 2), (60, 3)] {

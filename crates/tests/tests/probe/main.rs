@@ -5,7 +5,7 @@ mod closest;
 mod inside;
 mod oracle;
 
-use impinge_core::{Backend, BodyId, Detector, Elements, Scene, Settings};
+use impinge_core::{Backend, BodyId, Detector, Elements, InstructionSet, Scene, Settings};
 use impinge_scenes::surfaces;
 
 /// The surface of each body, element by element.
@@ -23,6 +23,17 @@ fn elements(scene: &Scene) -> Vec<(BodyId, u32, Vec<[f64; 3]>)> {
         }
     }
     all
+}
+
+/// Detectors of all instruction sets and two numbers of threads, which stand beside them.
+fn detectors() -> impl Iterator<Item = (usize, Detector)> {
+    InstructionSet::ALL.into_iter().flat_map(|instruction_set| {
+        [1, 4].map(|threads| {
+            let settings = Settings::new().instruction_set(instruction_set);
+            let settings = settings.threads(threads).backend(Backend::Cpu);
+            (threads, Detector::new(settings).unwrap())
+        })
+    })
 }
 
 /// However short the last question was: one point takes so little time that helpers would come too
