@@ -15,15 +15,15 @@ pub struct Case {
     pub query: Query,
 }
 
+/// Settings for the CPU.
+pub fn cpu(method: Method, threads: usize) -> Settings {
+    let settings = Settings::new().method(method).threads(threads);
+    settings.backend(Backend::Cpu)
+}
+
 /// A detector on the CPU.
 pub fn detector(method: Method, threads: usize) -> Detector {
-    Detector::new(
-        Settings::new()
-            .method(method)
-            .threads(threads)
-            .backend(Backend::Cpu),
-    )
-    .expect("settings")
+    Detector::new(cpu(method, threads)).expect("settings")
 }
 
 /// Detectors that must give the same bytes.

@@ -8,10 +8,8 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use impinge_core::{
-    Backend, BodyId, Candidates, Detector, Error, Method, PairKind, Query, Scene, Settings,
-};
-use impinge_tests::{agree, cases, naive, rows};
+use impinge_core::{BodyId, Candidates, Detector, Error, Method, PairKind, Query, Scene};
+use impinge_tests::{agree, cases, cpu, detector, naive, rows};
 
 /// Counts the bytes that are held, and refuses large requests beyond a limit, as a system does.
 struct Limited;
@@ -83,21 +81,6 @@ fn within_bytes<T>(more: usize, run: impl FnOnce() -> T) -> T {
     result
 }
 
-fn settings(method: Method) -> Settings {
-    Settings::new()
-        .method(method)
-        .backend(Backend::Cpu)
-        .threads(2)
-}
-
-fn detector(settings: Settings) -> Detector {
-    Detector::new(settings).unwrap()
-}
-
-fn detector_on_one_thread() -> Detector {
-    detector(settings(Method::Clusters).threads(1))
-}
-
 const METHODS: [Method; 3] = [Method::Clusters, Method::Cells, Method::Naive];
 
 /// A body of `n` triangles, turned around one axis that passes through all of them: they share no
@@ -152,7 +135,7 @@ fn an_answer_takes_twice_its_size_at_most() {
         (Method::Naive, 1_500),
     ] {
         let (scene, body) = pile(n);
-        let mut detector = detector(settings(method));
+        let mut detector = detector(method, 2);
         let before = HELD.load(Ordering::Relaxed);
         let (bytes_held, peak) = peak(|| {
             let pairs = detector.detect(&scene, &Query::self_of(body)).unwrap();
@@ -190,7 +173,7 @@ fn more_pairs_than_allowed_are_refused_before_they_are_held() {
         let query = Query::self_of(body);
         let all = n_pairs_of_pile(n);
         for limit in [0, 1, 1_000, all - 1] {
-            let mut limited = detector(settings(method).max_pairs(Some(limit)));
+            let mut limited = Detector::new(cpu(method, 2).max_pairs(Some(limit))).unwrap();
             let (result, peak) = peak(|| limited.detect(&scene, &query).map(|_| ()));
             match result {
                 Err(Error::TooManyPairs { found, limit: told }) => {
@@ -207,10 +190,12 @@ fn more_pairs_than_allowed_are_refused_before_they_are_held() {
                 assert!(peak < 8 << 20, "{method:?}: {peak} bytes");
             }
         }
-        let mut limited = detector(settings(method).max_pairs(Some(all)));
+        let mut limited = Detector::new(cpu(method, 2).max_pairs(Some(all))).unwrap();
         assert_eq!(limited.detect(&scene, &query).unwrap().len() as u64, all);
         assert_eq!(limited.count(&scene, &query).unwrap(), all);
-        let error = detector(settings(method).max_pairs(Some(7))).count(&scene, &query);
+        let error = Detector::new(cpu(method, 2).max_pairs(Some(7)))
+            .unwrap()
+            .count(&scene, &query);
         let text = error.unwrap_err().to_string();
         assert!(text.contains("at most 7"), "{text}");
     }
@@ -222,7 +207,7 @@ fn counting_holds_no_pairs() {
     let n = 4_000;
     let (scene, body) = pile(n);
     for method in [Method::Clusters, Method::Cells] {
-        let mut counting = detector(settings(method));
+        let mut counting = detector(method, 2);
         let (count, peak) = peak(|| counting.count(&scene, &Query::self_of(body)));
         assert_eq!(count.unwrap(), n_pairs_of_pile(n));
         assert!(peak < 8 << 20, "{method:?}: {peak} bytes");
@@ -238,7 +223,7 @@ fn counts_and_whether_there_is_any_agree_with_the_pairs() {
     for case in cases() {
         let expected = naive(&case);
         for method in [Method::Clusters, Method::Cells] {
-            let mut detector = detector(settings(method));
+            let mut detector = detector(method, 2);
             let count = detector.count(&case.scene, &case.query).unwrap();
             assert_eq!(count, expected.len() as u64, "{}, {method:?}", case.name);
             let any = detector.any(&case.scene, &case.query).unwrap();
@@ -255,7 +240,7 @@ fn any_ends_with_the_first_pair() {
     let (scene, body) = pile(6_000);
     for method in METHODS {
         // However many there are, one is enough.
-        let mut detector = detector(settings(method).max_pairs(Some(0)));
+        let mut detector = Detector::new(cpu(method, 2).max_pairs(Some(0))).unwrap();
         let (any, peak) = peak(|| detector.any(&scene, &Query::self_of(body)));
         assert!(any.unwrap());
         assert!(peak < 16 << 20, "{method:?}: {peak} bytes");
@@ -272,7 +257,7 @@ fn no_memory_is_an_error_and_the_detector_goes_on() {
     let query = Query::self_of(body);
     let answer = 8 * n_pairs_of_pile(n) as usize;
     for method in METHODS {
-        let mut detector = detector(settings(method));
+        let mut detector = detector(method, 2);
         // Chunks do not fit; they do, but not what joins them.
         for part in [answer / 2, answer * 3 / 2] {
             // All but the answer is there.
@@ -302,7 +287,7 @@ fn budgets_count_the_answer() {
     let query = Query::self_of(body);
     let answer = 8 * n_pairs_of_pile(n);
     for method in METHODS {
-        let mut free = detector(settings(method));
+        let mut free = detector(method, 2);
         let pairs = free.detect(&scene, &query).unwrap();
         let hash = pairs.hash();
         let scratch = pairs.stats().bytes_held - answer;
@@ -312,7 +297,7 @@ fn budgets_count_the_answer() {
             // A part of what is to spare goes to work items.
             ((2 * answer + 2 * scratch + (3 << 20)) / 4 * 5, true),
         ] {
-            let mut detector = detector(settings(method).memory_budget(Some(budget)));
+            let mut detector = Detector::new(cpu(method, 2).memory_budget(Some(budget))).unwrap();
             let before = HELD.load(Ordering::Relaxed);
             for frame in 0..2 {
                 let (result, peak) =
@@ -352,12 +337,12 @@ fn steps_keep_the_same_limits() {
     let all = (n * n) as u64;
     let scene = swarm(n);
     for method in [Method::Clusters, Method::Naive] {
-        let mut free = detector(settings(method));
+        let mut free = detector(method, 2);
         assert_eq!(free.impacts(&scene, &step()).unwrap().len() as u64, all);
         let candidates = free.candidates(&scene, 0.0, &swarm_candidates()).unwrap();
         assert_eq!(candidates.of(PairKind::VertexVertex).len() as u64, all);
 
-        let limited = |max_pairs| detector(settings(method).max_pairs(Some(max_pairs)));
+        let limited = |max_pairs| Detector::new(cpu(method, 2).max_pairs(Some(max_pairs))).unwrap();
         let refused = |result: Result<(), Error>, limit: u64| match result {
             Err(Error::TooManyPairs { found, limit: told }) => {
                 assert!(found > limit && told == limit && found <= limit + 20_000);
@@ -385,7 +370,7 @@ fn steps_keep_the_same_limits() {
                 other => panic!("{method:?}, {part}: {other:?}"),
             }
         }
-        let mut detector = detector(settings(method));
+        let mut detector = detector(method, 2);
         let part = 5 << 20;
         match within_bytes(part, || {
             detector
@@ -401,7 +386,7 @@ fn steps_keep_the_same_limits() {
         assert_eq!(candidates.len() as u64, all);
 
         let budgeted = |budget| {
-            let mut detector = crate::detector(settings(method).memory_budget(Some(budget)));
+            let mut detector = Detector::new(cpu(method, 2).memory_budget(Some(budget))).unwrap();
             let impacts = detector
                 .impacts(&scene, &step())
                 .map(|impacts| impacts.len());
@@ -437,7 +422,7 @@ fn runs_of_candidates_keep_the_budget() {
     ] {
         let mut before = usize::MAX;
         for budget in budgets {
-            let mut detector = detector(settings(method).memory_budget(Some(budget)));
+            let mut detector = Detector::new(cpu(method, 2).memory_budget(Some(budget))).unwrap();
             match detector.candidates(&scene, 0.0, &swarm_candidates()) {
                 Err(Error::MemoryBudget { .. }) => {}
                 other => panic!("{method:?}, {budget}: {:?}", other.map(|all| all.len())),
@@ -465,7 +450,7 @@ fn runs_of_candidates_keep_the_budget() {
             assert!((2..before).contains(&n_runs), "{method:?}: {n_runs} runs");
             before = n_runs;
         }
-        let mut detector = detector(settings(method).memory_budget(Some(100_000)));
+        let mut detector = Detector::new(cpu(method, 2).memory_budget(Some(100_000))).unwrap();
         let nothing = |_| -> ControlFlow<()> { panic!("no run") };
         match detector.candidates_in_runs(&scene, 0.0, &swarm_candidates(), u64::MAX, nothing) {
             Err(Error::MemoryBudget { needed, budget, .. }) => {
@@ -477,7 +462,7 @@ fn runs_of_candidates_keep_the_budget() {
 }
 
 fn few_bytes(method: Method, scene: &Scene) -> Result<usize, Error> {
-    let mut detector = detector(settings(method));
+    let mut detector = detector(method, 2);
     Ok(detector.impacts(scene, &step())?.len())
 }
 
@@ -487,7 +472,7 @@ fn impacts_take_twice_their_size_at_most() {
     let n = 1_000;
     let scene = swarm(n);
     for method in [Method::Clusters, Method::Naive] {
-        let mut detector = detector(settings(method));
+        let mut detector = detector(method, 2);
         let answer = 64 * n * n;
         let (bytes_held, of_impacts) = peak(|| {
             let impacts = detector.impacts(&scene, &step()).unwrap();
@@ -496,7 +481,7 @@ fn impacts_take_twice_their_size_at_most() {
         });
         assert!(of_impacts < 2 * answer, "{method:?}: {of_impacts}");
         assert!(bytes_held >= answer, "{method:?}: {bytes_held}");
-        let mut detector = crate::detector(settings(method));
+        let mut detector = impinge_tests::detector(method, 2);
         let (bytes_held, of_candidates) = peak(|| {
             let candidates = detector
                 .candidates(&scene, 0.0, &swarm_candidates())
@@ -516,12 +501,12 @@ fn impacts_take_twice_their_size_at_most() {
 fn contacts_without_memory_are_an_error() {
     let _alone = alone();
     let (scene, body) = pile(700);
-    let mut detector = detector(settings(Method::Clusters));
+    let mut detector = detector(Method::Clusters, 2);
     let pairs = detector
         .detect(&scene, &Query::self_of(body))
         .unwrap()
         .clone();
-    let mut detector = detector_on_one_thread();
+    let mut detector = impinge_tests::detector(Method::Clusters, 1);
     let (contacts, peak) = peak(|| detector.contacts(&scene, &pairs).unwrap());
     assert_eq!(contacts.len() as u64, n_pairs_of_pile(700));
     drop(contacts);

@@ -1,16 +1,9 @@
 //! Triangles around a vertex, under `SharedVertex::Resolve`: where the vertex says that none of
 //! them meet, none do.
 
-use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, SharedVertex};
+use impinge_core::{Method, Query, Scene, SharedVertex};
 use impinge_scenes::Random;
-use impinge_tests::{Case, check, naive, rows};
-
-fn settings(threads: usize) -> Settings {
-    Settings::new()
-        .method(Method::Clusters)
-        .backend(Backend::Cpu)
-        .threads(threads)
-}
+use impinge_tests::{Case, check, cpu, detector, naive, rows};
 
 /// Several fans around vertices of their own, open or closed, some of which share vertices.
 fn fans(
@@ -75,7 +68,7 @@ fn random_fans_are_answered_as_the_oracle_does() {
                 true => n_without += 1,
                 false => n_with += 1,
             }
-            check(&case, &expected, settings(1));
+            check(&case, &expected, cpu(Method::Clusters, 1));
         }
     }
     assert!(n_with > 500 && n_without > 500, "{n_with} and {n_without}");
@@ -108,7 +101,7 @@ fn creases_follow_the_positions() {
     let mut scene = Scene::new();
     let body = scene.add((faces, strip(-1.0))).unwrap();
     for threads in [1, 2] {
-        let mut detector = Detector::new(settings(threads)).unwrap();
+        let mut detector = detector(Method::Clusters, threads);
         for (turn, meets) in [(-1.0, false), (1.0, true), (-0.5, false), (0.5, true)] {
             scene.set_positions(body, strip(turn)).unwrap();
             for rule in [SharedVertex::Skip, SharedVertex::Resolve] {

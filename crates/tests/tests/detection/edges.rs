@@ -5,22 +5,10 @@ use std::collections::BTreeMap;
 
 use impinge_core::exact::Feature;
 use impinge_core::{
-    Backend, BodyId, Detector, Element, Elements, Error, Method, PairKind, Part, Query, Scene,
-    Settings, Thickness,
+    BodyId, Detector, Element, Elements, Error, PairKind, Part, Query, Scene, Thickness,
 };
 use impinge_scenes::{Random, solids, surfaces};
-
-fn detectors() -> [Detector; 3] {
-    [
-        (Method::Clusters, 1),
-        (Method::Clusters, 4),
-        (Method::Naive, 1),
-    ]
-    .map(|(method, threads)| {
-        let settings = Settings::new().method(method).threads(threads);
-        Detector::new(settings.backend(Backend::Cpu)).expect("settings")
-    })
-}
+use impinge_tests::detectors;
 
 /// Crumpled cloth, and a solid that meets it; random end positions.
 fn scene(seed: u64) -> (Scene, [BodyId; 2]) {

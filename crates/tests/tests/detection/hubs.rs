@@ -2,18 +2,11 @@
 //! plus output.
 
 use impinge_core::{
-    Backend, Detector, Elements, Error, Method, Query, Scene, Settings, SharedVertex, Stats,
+    Detector, Elements, Error, Method, Query, Scene, Settings, SharedVertex, Stats,
 };
-use impinge_tests::{Case, check, naive};
+use impinge_tests::{Case, check, cpu, detector, naive};
 
 const RULES: [SharedVertex; 2] = [SharedVertex::Skip, SharedVertex::Resolve];
-
-fn settings() -> Settings {
-    Settings::new()
-        .method(Method::Clusters)
-        .backend(Backend::Cpu)
-        .threads(2)
-}
 
 fn case(name: &str, elements: Elements, positions: &[[f64; 3]], rule: SharedVertex) -> Case {
     let mut scene = Scene::new();
@@ -28,7 +21,7 @@ fn case(name: &str, elements: Elements, positions: &[[f64; 3]], rule: SharedVert
 fn check_both(name: &str, elements: &Elements, positions: &[[f64; 3]]) {
     for rule in RULES {
         let case = case(name, elements.clone(), positions, rule);
-        check(&case, &naive(&case), settings());
+        check(&case, &naive(&case), cpu(Method::Clusters, 2));
     }
 }
 
@@ -161,7 +154,7 @@ fn lattices_with_hubs_are_answered_as_by_the_oracle() {
 
 fn statistics(elements: Elements, positions: &[[f64; 3]], rule: SharedVertex) -> (usize, Stats) {
     let case = case("large", elements, positions, rule);
-    let mut detector = Detector::new(settings()).unwrap();
+    let mut detector = detector(Method::Clusters, 2);
     let pairs = detector.detect(&case.scene, &case.query).unwrap();
     (pairs.len(), pairs.stats().clone())
 }
@@ -198,7 +191,7 @@ fn a_million_faces_with_the_same_vertices_cost_nothing() {
     let triangle = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let of_face =
         |face: [u32; 3], rule| case("same", vec![face; 1_000_000].into(), &triangle, rule);
-    let mut detector = Detector::new(settings()).unwrap();
+    let mut detector = detector(Method::Clusters, 2);
     for face in [[0; 3], [0, 1, 2]] {
         let skipped = of_face(face, SharedVertex::Skip);
         let pairs = detector.detect(&skipped.scene, &skipped.query).unwrap();
@@ -215,18 +208,18 @@ fn a_million_faces_with_the_same_vertices_cost_nothing() {
         let mut detector = Detector::new(settings).unwrap();
         detector.detect(&case.scene, &case.query).unwrap_err()
     };
-    let memory = refused(settings());
+    let memory = refused(cpu(Method::Clusters, 2));
     let bytes = 8 * n_pairs;
     assert!(
         matches!(memory, Error::OutOfMemory { needed, .. } if needed == bytes),
         "{memory}"
     );
-    let limit = refused(settings().max_pairs(Some(1_000)));
+    let limit = refused(cpu(Method::Clusters, 2).max_pairs(Some(1_000)));
     assert!(
         matches!(limit, Error::TooManyPairs { found, limit: 1_000 } if found == n_pairs),
         "{limit}"
     );
-    let budget = refused(settings().memory_budget(Some(1 << 30)));
+    let budget = refused(cpu(Method::Clusters, 2).memory_budget(Some(1 << 30)));
     assert!(
         matches!(budget, Error::MemoryBudget { needed, budget, .. } if needed >= bytes && budget == 1 << 30),
         "{budget}"

@@ -4,18 +4,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use impinge_core::{
-    Backend, BodyId, CancelToken, Control, Detector, Error, Method, Query, Scene, Settings,
-    SharedVertex,
+    BodyId, CancelToken, Control, Detector, Error, Method, Query, Scene, Settings, SharedVertex,
 };
 use impinge_scenes::{adversarial, surfaces};
-use impinge_tests::{Case, agree, check, naive, rows};
-
-fn cpu(method: Method) -> Settings {
-    Settings::new()
-        .method(method)
-        .backend(Backend::Cpu)
-        .threads(2)
-}
+use impinge_tests::{Case, agree, check, cpu, detector, naive, rows};
 
 const TRIANGLE: [[f32; 3]; 3] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
@@ -80,7 +72,7 @@ fn bad_bodies_are_refused_by_name() {
     ));
     // None of these bodies was added.
     assert_eq!(scene.n_bodies(), 1);
-    let mut detector = Detector::new(cpu(Method::Clusters)).unwrap();
+    let mut detector = detector(Method::Clusters, 2);
     // One text for pairs and for distances.
     let same = [
         detector.detect(&scene, &Query::between(good, good)).err(),
@@ -118,7 +110,7 @@ fn bodies_of_other_scenes_are_refused() {
     is_refused(ours.set_positions(other, &TRIANGLE));
     is_refused(ours.remove(other));
     is_refused(ours.body(other).map(|_| ()));
-    let mut detector = Detector::new(cpu(Method::Clusters)).unwrap();
+    let mut detector = detector(Method::Clusters, 2);
     for query in [Query::self_of(other), Query::between(a, other)] {
         is_refused(detector.detect(&ours, &query).map(|_| ()));
     }
@@ -147,7 +139,7 @@ fn positions_written_in_place_are_checked_wherever_the_vertex_is() {
             }
             let last = model.positions.len() - 1;
             let a = model.add_to(&mut scene).unwrap();
-            let mut detector = Detector::new(cpu(method)).unwrap();
+            let mut detector = detector(method, 2);
             let query = Query::self_of(a);
             let n_pairs = detector.detect(&scene, &query).unwrap().len();
             for vertex in [0, 77, last] {
@@ -172,7 +164,7 @@ fn the_first_bad_position_of_a_large_body_is_named() {
     let ball = surfaces::ball(160_000);
     let mut scene = Scene::new();
     let body = ball.add_to(&mut scene).unwrap();
-    let mut detector = Detector::new(cpu(Method::Cells).threads(3)).unwrap();
+    let mut detector = detector(Method::Cells, 3);
     let query = Query::self_of(body);
     let last = ball.positions.len() - 1;
     assert!(last > 2 << 15, "for several threads: {last}");
@@ -238,7 +230,7 @@ fn many_positions_that_are_not_copied_are_checked_by_the_next_question() {
     assert!(last > 1 << 15);
     bad[last][1] = f32::NAN;
     for threads in [1, 2] {
-        let mut detector = Detector::new(cpu(Method::Auto).threads(threads)).unwrap();
+        let mut detector = detector(Method::Auto, threads);
         for (name, ask) in &asks {
             for shared in [false, true] {
                 match shared {
@@ -309,7 +301,7 @@ fn the_largest_and_smallest_coordinates_are_answered() {
     let expected = naive(&case);
     assert!(expected.len() >= 3);
     for method in [Method::Clusters, Method::Cells] {
-        check(&case, &expected, cpu(method));
+        check(&case, &expected, cpu(method, 2));
     }
 }
 
@@ -334,7 +326,7 @@ fn budgets_are_kept_by_batches() {
     let built = adversarial::coincident(30_000).unwrap();
     let query = Query::all().shared_vertex(SharedVertex::Skip);
     for method in [Method::Clusters, Method::Cells] {
-        let mut free = Detector::new(cpu(method)).unwrap();
+        let mut free = detector(method, 2);
         let pairs = free.detect(&built.scene, &query).unwrap();
         let expected = rows(&pairs);
         // While it is found, the answer takes twice its size, and a part of a chunk more. The grid
@@ -352,7 +344,7 @@ fn budgets_are_kept_by_batches() {
         let mut most_batches = 0;
         while enough - refused > held / 200 {
             let budget = (refused + enough) / 2;
-            let settings = cpu(method).memory_budget(Some(budget));
+            let settings = cpu(method, 2).memory_budget(Some(budget));
             let mut detector = Detector::new(settings).unwrap();
             match detector.count(&built.scene, &query) {
                 Ok(n) => {
@@ -363,7 +355,7 @@ fn budgets_are_kept_by_batches() {
                     most_batches = most_batches.max(stats.n_batches);
                     let budget_of_pairs = budget + of_answer;
                     let mut detector =
-                        Detector::new(cpu(method).memory_budget(Some(budget_of_pairs))).unwrap();
+                        Detector::new(cpu(method, 2).memory_budget(Some(budget_of_pairs))).unwrap();
                     let pairs = detector.detect(&built.scene, &query).unwrap();
                     agree(&expected, &rows(&pairs), pairs.hash()).unwrap();
                     assert!(pairs.stats().bytes_held <= budget_of_pairs);
@@ -406,7 +398,7 @@ fn adversarial_scenes_hold_memory_in_proportion() {
     ] {
         let built = built.unwrap();
         for (method, most_each) in [(Method::Clusters, 400), (Method::Cells, 400)] {
-            let mut detector = Detector::new(cpu(method)).unwrap();
+            let mut detector = detector(method, 2);
             let pairs = detector.detect(&built.scene, &built.query).unwrap();
             let (n, n_bodies) = (built.n_elements() as u64, built.bodies.len() as u64);
             let most = most_each * n + 2_000 * n_bodies + (16 << 20);
@@ -424,7 +416,7 @@ fn adversarial_scenes_hold_memory_in_proportion() {
 #[test]
 fn directions_tell_long_elements_apart() {
     let built = adversarial::machine_parts(20_000).unwrap();
-    let mut detector = Detector::new(cpu(Method::Clusters)).unwrap();
+    let mut detector = detector(Method::Clusters, 2);
     let pairs = detector.detect(&built.scene, &built.query).unwrap();
     let (n, n_parted) = (pairs.stats().n_candidates, pairs.stats().ways.n_parted);
     assert!(4 * n_parted > n, "{n_parted} of {n} candidates");
@@ -435,7 +427,7 @@ fn directions_tell_long_elements_apart() {
 fn progress_counts_what_is_done() {
     const THREADS: usize = 4;
     let built = adversarial::plain(20_000).unwrap();
-    let mut detector = Detector::new(cpu(Method::Clusters).threads(THREADS)).unwrap();
+    let mut detector = detector(Method::Clusters, THREADS);
     let seen = Arc::new(Mutex::new(Vec::new()));
     let all = Arc::clone(&seen);
     let see = move |progress: impinge_core::Progress| all.lock().unwrap().push(progress);
@@ -468,7 +460,7 @@ fn runs_can_be_watched_and_cancelled() {
         (Method::Naive, 2_000),
     ] {
         let built = adversarial::plain(n).unwrap();
-        let mut detector = Detector::new(cpu(method)).unwrap();
+        let mut detector = detector(method, 2);
         let (calls, token) = (Arc::new(AtomicU64::new(0)), CancelToken::new());
         let counted = Arc::clone(&calls);
         let count = move |progress: impinge_core::Progress| {

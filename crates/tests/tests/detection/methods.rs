@@ -3,19 +3,12 @@
 use std::sync::Arc;
 
 use impinge_core::{
-    Affinity, Backend, Detector, Error, InstructionSet, Method, Positions, Query, Recluster, Scene,
-    Settings, SharedVertex, Start, hash_rows,
+    Affinity, Detector, Error, InstructionSet, Method, Positions, Query, Recluster, Scene,
+    SharedVertex, Start, hash_rows,
 };
 use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{soup, surfaces};
-use impinge_tests::{Case, agree, cases, check, naive, rows};
-
-fn cpu(method: Method, threads: usize) -> Settings {
-    Settings::new()
-        .method(method)
-        .threads(threads)
-        .backend(Backend::Cpu)
-}
+use impinge_tests::{Case, agree, cases, check, cpu, detector, naive, rows};
 
 #[test]
 fn methods_agree_with_the_oracle() {
@@ -49,7 +42,7 @@ fn methods_agree_with_the_oracle() {
 fn methods_count_the_same_candidates() {
     for case in cases() {
         let count = |method: Method| {
-            let mut detector = Detector::new(cpu(method, 1)).unwrap();
+            let mut detector = detector(method, 1);
             let pairs = detector.detect(&case.scene, &case.query).unwrap();
             pairs.stats().n_candidates
         };
@@ -103,8 +96,8 @@ fn frames_follow_the_positions() {
     let a = rest.add_to(&mut scene).unwrap();
     let b = rest.translated([0.2, 0.1, 0.3]).add_to(&mut scene).unwrap();
     let query = Query::all();
-    let mut clusters = Detector::new(cpu(Method::Clusters, 2)).unwrap();
-    let mut cells = Detector::new(cpu(Method::Cells, 2)).unwrap();
+    let mut clusters = detector(Method::Clusters, 2);
+    let mut cells = detector(Method::Cells, 2);
     let mut seen = std::collections::BTreeSet::new();
     for frame in 0..6 {
         let moved = rest.mapped(|[x, y, z]| {
@@ -137,8 +130,7 @@ fn bodies_come_go_and_change() {
     let ball = surfaces::ball(400);
     let a = ball.add_to(&mut scene).unwrap();
     let b = ball.translated([0.5, 0.0, 0.0]).add_to(&mut scene).unwrap();
-    let mut detectors =
-        [Method::Clusters, Method::Cells].map(|method| Detector::new(cpu(method, 1)).unwrap());
+    let mut detectors = [Method::Clusters, Method::Cells].map(|method| detector(method, 1));
     let mut compare = |scene: &Scene| {
         let case = Case {
             name: "changes".into(),
@@ -177,7 +169,7 @@ fn metamorphic_twins_agree() {
     let pairs_of = |a: &impinge_scenes::Model, b: &impinge_scenes::Model, method| {
         let mut scene = Scene::new();
         let (id_a, id_b) = (a.add_to(&mut scene).unwrap(), b.add_to(&mut scene).unwrap());
-        let mut detector = Detector::new(cpu(method, 1)).unwrap();
+        let mut detector = detector(method, 1);
         let pairs = detector
             .detect(&scene, &Query::between(id_a, id_b))
             .unwrap();
@@ -219,7 +211,7 @@ fn bodies_that_flow_away_are_clustered_again() {
     let a = rest.add_to(&mut scene).unwrap();
     let b = rest.translated([0.4, 0.0, 0.0]).add_to(&mut scene).unwrap();
     let query = Query::between(a, b);
-    let mut auto = Detector::new(cpu(Method::Clusters, 1)).unwrap();
+    let mut auto = detector(Method::Clusters, 1);
     let mut never = Detector::new(cpu(Method::Clusters, 1).recluster(Recluster::Never)).unwrap();
     assert_eq!(auto.detect(&scene, &query).unwrap().stats().n_clustered, 2);
     never.detect(&scene, &query).unwrap();
@@ -253,7 +245,7 @@ fn a_frame_that_failed_leaves_nothing_behind() {
         let a = ball.add_to(&mut scene).unwrap();
         let b = ball.translated([0.8, 0.1, 0.0]).add_to(&mut scene).unwrap();
         let query = Query::between(a, b);
-        let mut detector = Detector::new(cpu(method, 1)).unwrap();
+        let mut detector = detector(method, 1);
         for _ in 0..decided {
             scene.set_positions(a, &ball.positions).unwrap();
             let place = ball.translated([0.8, 0.1, 0.0]).positions;
@@ -272,7 +264,7 @@ fn a_frame_that_failed_leaves_nothing_behind() {
             assert!(detector.detect(&scene, &query).is_err());
             scene = saved.clone();
             for offset in [[0.8, 0.1, 0.0], [-0.8, 0.1, 0.0], [0.0, 0.0, 0.9]] {
-                let mut fresh = Detector::new(cpu(method, 1)).unwrap();
+                let mut fresh = impinge_tests::detector(method, 1);
                 let expected = fresh.detect(&scene, &query).unwrap();
                 assert!(!expected.is_empty());
                 let found = detector.detect(&scene, &query).unwrap();
@@ -300,8 +292,8 @@ fn auto_asks_the_grid_once_and_clusters_from_then_on() {
     let mut scene = Scene::new();
     let [a, b] = large_balls(&mut scene);
     let query = Query::between(a, b);
-    let mut auto = Detector::new(cpu(Method::Auto, 2)).unwrap();
-    let mut clusters = Detector::new(cpu(Method::Clusters, 2)).unwrap();
+    let mut auto = detector(Method::Auto, 2);
+    let mut clusters = detector(Method::Clusters, 2);
     let mut ask = |scene: &Scene, query: &Query| {
         let pairs = auto.detect(scene, query).unwrap();
         let expected = clusters.detect(scene, query).unwrap();
@@ -381,7 +373,7 @@ fn auto_finds_the_same_in_the_grid_as_clusters_do() {
         Query::between_all(),
         Query::all().shared_vertex(SharedVertex::Skip),
     ] {
-        let new = |method| Detector::new(cpu(method, 2)).unwrap();
+        let new = |method| detector(method, 2);
         let mut clusters = new(Method::Clusters);
         let expected = clusters.detect(&scene, &query).unwrap();
         let n = expected.len() as u64;
@@ -399,7 +391,7 @@ fn auto_finds_the_same_in_the_grid_as_clusters_do() {
 fn auto_frees_the_grid_and_what_bodies_that_are_gone_had() {
     let mut scene = Scene::new();
     let [a, b] = large_balls(&mut scene);
-    let mut auto = Detector::new(cpu(Method::Auto, 1)).unwrap();
+    let mut auto = detector(Method::Auto, 1);
     let mut held = |scene: &Scene, method: &str| {
         // Neither the pairs nor memory to sort them in is held.
         auto.count(scene, &Query::between_all()).unwrap();
@@ -441,7 +433,7 @@ fn auto_leaves_crowded_cells_resolved_neighbours_and_budgets_to_clusters() {
         let query = Query::all().shared_vertex(rule);
         let mut auto = Detector::new(cpu(Method::Auto, 2).memory_budget(memory_budget)).unwrap();
         let pairs = auto.detect(&scene, &query).unwrap();
-        let mut cells = Detector::new(cpu(Method::Cells, 2)).unwrap();
+        let mut cells = detector(Method::Cells, 2);
         assert!(
             pairs
                 .rows()
@@ -469,7 +461,7 @@ fn auto_refuses_what_the_grid_does_not_look_at() {
     let mut scene = Scene::new();
     let [a, b] = large_balls(&mut scene);
     scene.positions_mut::<f32>(a).unwrap()[7] = [f32::NAN; 3];
-    let mut auto = Detector::new(cpu(Method::Auto, 2)).unwrap();
+    let mut auto = detector(Method::Auto, 2);
     let error = auto.detect(&scene, &Query::between(a, b)).unwrap_err();
     assert!(error.to_string().contains("vertex 7"), "{error}");
 }
@@ -480,7 +472,7 @@ fn pairs_of_all_cells_are_the_pairs_of_the_whole() {
     // Every kind of case is among them.
     for case in cases().into_iter().step_by(3) {
         let expected = naive(&case);
-        let mut detector = Detector::new(cpu(Method::Clusters, 1)).unwrap();
+        let mut detector = detector(Method::Clusters, 1);
         let mut found = Vec::new();
         for octant in 0..8 {
             // Cut at lattice points, where boxes end.
@@ -503,7 +495,7 @@ fn pairs_of_all_cells_are_the_pairs_of_the_whole() {
 fn cells_are_refused_where_they_mean_nothing() {
     let mut scene = Scene::new();
     let [a, b] = large_balls(&mut scene);
-    let mut detector = Detector::new(cpu(Method::Auto, 1)).unwrap();
+    let mut detector = detector(Method::Auto, 1);
     let query = Query::between(a, b).owned_by([0.0; 3], [f64::NAN; 3]);
     let error = detector.detect(&scene, &query).unwrap_err().to_string();
     assert!(error.starts_with("owned_by: "), "{error}");
@@ -529,7 +521,7 @@ fn positions_that_are_taken_over_are_those_of_the_body() {
     let mut scene = Scene::new();
     let [a, b] = large_balls(&mut scene);
     let query = Query::between(a, b);
-    let mut detector = Detector::new(cpu(Method::Clusters, 1)).unwrap();
+    let mut detector = detector(Method::Clusters, 1);
     detector.detect(&scene, &query).unwrap();
     let ball = surfaces::ball(12_000);
     let mut copied = scene.clone();
@@ -559,7 +551,7 @@ fn lent_positions_are_those_that_would_have_been_copied() {
     let mut scene = Scene::new();
     let [a, b] = large_balls(&mut scene);
     let query = Query::between(a, b);
-    let mut detector = Detector::new(cpu(Method::Clusters, 1)).unwrap();
+    let mut detector = detector(Method::Clusters, 1);
     detector.detect(&scene, &query).unwrap();
     let ball = surfaces::ball(12_000);
     let mut copied = scene.clone();
@@ -643,7 +635,7 @@ fn lent_ends_of_a_step_are_those_that_would_have_been_copied() {
     let mut scene = Scene::new();
     let [_, b] = large_balls(&mut scene);
     let mut copied = scene.clone();
-    let mut detector = Detector::new(cpu(Method::Clusters, 1)).unwrap();
+    let mut detector = detector(Method::Clusters, 1);
     let ball = surfaces::ball(12_000);
     let ends = [0.9, 0.6].map(|x| ball.translated([x, 0.0, 0.2]));
     // The second end is in double precision: the start is widened.
@@ -671,7 +663,7 @@ fn lent_ends_of_a_step_are_those_that_would_have_been_copied() {
 fn lent_ends_are_dropped_when_the_body_stands_still() {
     let mut scene = Scene::new();
     let [_, b] = large_balls(&mut scene);
-    let mut detector = Detector::new(cpu(Method::Clusters, 1)).unwrap();
+    let mut detector = detector(Method::Clusters, 1);
     let start = scene.body(b).unwrap().positions().clone();
     let lent = Arc::new(surfaces::ball(12_000).translated([9.0; 3]).positions);
     let unit: [[f64; 4]; 4] =

@@ -1,15 +1,8 @@
 //! Flat and regular meshes: the oracle's answers, without exact arithmetic.
 
-use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, SharedVertex};
+use impinge_core::{Method, Query, Scene, SharedVertex};
 use impinge_scenes::{Model, regular};
-use impinge_tests::{Case, check, naive};
-
-fn settings(method: Method) -> Settings {
-    Settings::new()
-        .method(method)
-        .backend(Backend::Cpu)
-        .threads(1)
-}
+use impinge_tests::{Case, check, cpu, detector, naive};
 
 /// One case per precision: each has its own filters.
 fn cases(name: &str, model: &Model, rule: SharedVertex) -> [Case; 2] {
@@ -36,9 +29,9 @@ fn regular_meshes_are_decided_by_filters() {
             for case in cases(surface.name, &model, rule) {
                 let expected = naive(&case);
                 assert!(expected.is_empty(), "{}", case.name);
-                check(&case, &expected, settings(Method::Clusters));
-                check(&case, &expected, settings(Method::Cells));
-                let mut detector = Detector::new(settings(Method::Clusters)).unwrap();
+                check(&case, &expected, cpu(Method::Clusters, 1));
+                check(&case, &expected, cpu(Method::Cells, 1));
+                let mut detector = detector(Method::Clusters, 1);
                 let pairs = detector.detect(&case.scene, &case.query).unwrap();
                 let stats = pairs.stats();
                 assert!(
@@ -62,7 +55,7 @@ fn folded_sheets_are_answered_as_by_the_oracle() {
             let model = model.mapped(|[x, y, z]| [(x - crease).abs(), y, z]);
             for rule in [SharedVertex::Skip, SharedVertex::Resolve] {
                 for case in cases(surface.name, &model, rule) {
-                    check(&case, &naive(&case), settings(Method::Clusters));
+                    check(&case, &naive(&case), cpu(Method::Clusters, 1));
                 }
             }
         }

@@ -4,25 +4,17 @@
 use std::time::Duration;
 
 use impinge_core::{
-    Backend, BodyId, Detector, Element, Impact, Method, NearPair, PairKind, Pairs, Positions,
-    Query, Scene, Settings, SharedVertex, Stats, Tuning,
+    BodyId, Detector, Element, Impact, Method, NearPair, PairKind, Pairs, Positions, Query, Scene,
+    SharedVertex, Stats, Tuning,
 };
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
-use impinge_tests::{agree, cases, check, landing, leaves_out, naive, rows};
+use impinge_tests::{agree, cases, check, cpu, landing, leaves_out, naive, rows};
 
 const ZERO: usize = 0;
 const INFINITY: usize = 1;
 
 fn detector(method: Method, threads: usize, tuning: Tuning) -> Detector {
-    Detector::new(settings(method, threads, tuning)).unwrap()
-}
-
-fn settings(method: Method, threads: usize, tuning: Tuning) -> Settings {
-    Settings::new()
-        .method(method)
-        .threads(threads)
-        .tuning(tuning)
-        .backend(Backend::Cpu)
+    Detector::new(cpu(method, threads).tuning(tuning)).unwrap()
 }
 
 /// All thresholds where most of the code behind them is entered.
@@ -99,7 +91,7 @@ fn no_threshold_changes_the_answer_to_a_case() {
         let together = extremes.iter().skip(case_ix % 3).step_by(3);
         for tuned in chosen.chain(together) {
             for &method in tuned.methods {
-                check(&case, &expected, settings(method, 2, tuned.tuning));
+                check(&case, &expected, cpu(method, 2).tuning(tuned.tuning));
             }
         }
     }

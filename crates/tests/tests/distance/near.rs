@@ -10,6 +10,7 @@ use impinge_core::{
     NearPair, NearPairs, PairKind, Part, Query, Scene, Settings, Thickness,
 };
 use impinge_scenes::{Random, adversarial, soup, surfaces};
+use impinge_tests::{detector, detectors};
 
 type Point = [f64; 3];
 
@@ -32,14 +33,6 @@ fn with_all_settings(memory_budget: u64) -> impl Iterator<Item = (usize, Detecto
                 .memory_budget(memory_budget);
             (threads, Detector::new(settings).expect("settings"))
         })
-}
-
-fn detector(method: Method) -> Detector {
-    Detector::new(Settings::new().method(method).backend(Backend::Cpu)).expect("settings")
-}
-
-fn detectors() -> [Detector; 2] {
-    [Method::Clusters, Method::Naive].map(detector)
 }
 
 /// What is compared of a pair.
@@ -467,7 +460,7 @@ fn answers_with_a_thickness_of_each_element_depend_on_the_input_alone() {
         }
         let distance = 0.045 * scale;
         let query = Query::all().closest_points();
-        let mut oracle = detector(Method::Naive);
+        let mut oracle = detector(Method::Naive, 2);
         let naive = oracle.near(&scene, distance, &query).expect("good");
         let lists = oracle.neighbours(&scene, distance, &query).expect("good");
         let safe = oracle
@@ -496,7 +489,7 @@ fn answers_with_a_thickness_of_each_element_depend_on_the_input_alone() {
     }
     let mut scene = Scene::new();
     let body = ball.add_to(&mut scene).expect("good");
-    let mut detector = detector(Method::Clusters);
+    let mut detector = detector(Method::Clusters, 2);
     let mut hash = |scene: &Scene| {
         let near = detector.near(scene, 0.1, &Query::all()).expect("good");
         (near.hash(), near.len())
@@ -523,7 +516,7 @@ fn boxes_reach_as_far_as_their_own_elements_are_thick() {
     let mut scene = Scene::new();
     let sheet = surfaces::cloth(60, 60, 1.0);
     let body = sheet.add_to(&mut scene).expect("good");
-    let mut detector = detector(Method::Clusters);
+    let mut detector = detector(Method::Clusters, 2);
     let mut count = |scene: &Scene| {
         let near = detector.near(scene, 0.1, &Query::all()).expect("good");
         near.stats().n_candidates
@@ -619,7 +612,7 @@ fn edges_and_faces_are_as_far_as_their_nearest_parts() {
         let query = Query::between_all()
             .kinds([PairKind::EdgeFace, PairKind::FaceFace])
             .closest_points();
-        let mut detector = detector(Method::Clusters);
+        let mut detector = detector(Method::Clusters, 2);
         let near = detector.near(&scene, 1.0, &query).expect("good");
         for pair in near.iter() {
             let corners = |part, body: BodyId, number: u32| -> Vec<Point> {
@@ -715,7 +708,7 @@ fn the_answer_depends_on_the_input_alone() {
         }
         let plain = Query::all();
         let query = plain.clone().closest_points();
-        let naive = detector(Method::Naive)
+        let naive = detector(Method::Naive, 2)
             .near(&scene, distance, &query)
             .expect("good");
         assert!(naive.len() > 100, "{}", naive.len());
@@ -731,7 +724,7 @@ fn the_answer_depends_on_the_input_alone() {
             assert!(near.iter().all(|pair| pair.closest.is_none()));
         }
         // One pair more changes the hash.
-        let fewer = detector(Method::Clusters)
+        let fewer = detector(Method::Clusters, 2)
             .near(&scene, distance / 2.0, &Query::all())
             .expect("good");
         assert!(fewer.len() < naive.len() && fewer.hash() != naive.hash());
@@ -746,7 +739,7 @@ fn a_distance_of_zero_is_intersection_and_larger_ones_only_add() {
         let model = soup::triangles(80, 0.4, seed);
         model.add_to(&mut scene).expect("good");
     }
-    let mut detector = detector(Method::Clusters);
+    let mut detector = detector(Method::Clusters, 2);
     let pairs = detector
         .detect(&scene, &Query::between_all())
         .expect("good");
@@ -883,7 +876,7 @@ fn long_elements_are_near_as_the_oracle_says() {
         for distance in [0.0, 0.001, 0.05] {
             let query = Query::all();
             let [expected, found] = [Method::Naive, Method::Clusters].map(|method| {
-                let mut detector = detector(method);
+                let mut detector = detector(method, 2);
                 rows(&detector.near(scene, distance, &query).unwrap())
             });
             assert_eq!(expected, found, "{distance}");

@@ -3,6 +3,7 @@
 use impinge_core::proximity::Nearest;
 use impinge_core::{Backend, BodyId, Detector, Filter, PairKind, Query, Scene, Settings};
 use impinge_scenes::{Model, adversarial, solids, soup, surfaces};
+use impinge_tests::times_power;
 
 fn scene(a: &Model, b: &Model) -> (Scene, [BodyId; 2]) {
     let mut scene = Scene::new();
@@ -216,11 +217,6 @@ fn distances_of_numbers_of_any_size() {
     let nearest = cpu().distance(&scene, ids[0], ids[1]).unwrap();
     let distance = nearest.unwrap().distance;
     assert!(distance > 0.0 && distance < 1e290, "{distance:e}");
-}
-
-fn times_power(x: f64, exponent: i32) -> f64 {
-    let half = exponent / 2;
-    x * 2f64.powi(half) * 2f64.powi(exponent - half)
 }
 
 /// The box of each element.

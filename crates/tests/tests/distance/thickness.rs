@@ -3,14 +3,14 @@
 
 use crate::near::{Element, PARTS, elements, thickness, thickness_by, thickness_of};
 use crate::separation::{
-    Elements, contacts, detector, detectors, first_kept, impacts, is_the_same_everywhere, lattice,
-    rows, two_soups,
+    Elements, contacts, first_kept, impacts, is_the_same_everywhere, lattice, rows, two_soups,
 };
 use impinge_core::exact::first_within;
 use impinge_core::{
     BodyId, Clearance, Impact, Method, PairKind, Part, Precision, Query, Scene, Start, Thickness,
 };
 use impinge_scenes::Random;
+use impinge_tests::{detector, detectors};
 
 /// A scene in which bodies have a thickness for each vertex, edge or face, or one number.
 struct Thick {
@@ -195,7 +195,7 @@ fn one_thickness_for_all_is_a_separation() {
             thick.set_thickness(body, radius).expect("good");
         }
         for method in [Method::Clusters, Method::Naive] {
-            let mut detector = detector(method);
+            let mut detector = detector(method, 2);
             for (separation, clearance) in [(0.0, 0.0), (0.0, 0.01), (0.25, 0.0)] {
                 let step = Query::all().clearance(clearance);
                 let kept = step.clone().separation(separation + 2.0 * radius);
@@ -270,7 +270,7 @@ fn vertices_stop_before_thick_elements() {
             .set_thickness(bodies[0], Thickness::vertices(&each[..]))
             .expect("good");
         let query = Query::between(bodies[0], bodies[1]);
-        let mut detector = detector(Method::Clusters);
+        let mut detector = detector(Method::Clusters, 2);
         let near = |detector: &mut impinge_core::Detector, scene: &Scene| {
             let near = detector.near(scene, 0.0, &query).expect("good");
             Vec::from_iter(near.iter().map(|pair| (pair.kind, pair.row())))

@@ -1,19 +1,8 @@
 //! What a step knows of its start: intersections that touch nothing, and seams of meshes that were
 //! not welded.
 
-use impinge::{
-    Backend, BodyId, Detector, Error, Method, PairFilter, PairKind, Query, Scene, Settings, Start,
-    Weld,
-};
-
-fn detectors() -> Vec<Detector> {
-    [Method::Clusters, Method::Naive]
-        .map(|method| {
-            let settings = Settings::new().backend(Backend::Cpu).method(method);
-            Detector::new(settings).expect("settings")
-        })
-        .into()
-}
+use impinge::{BodyId, Error, PairFilter, PairKind, Query, Scene, Start, Weld};
+use impinge_tests::detectors;
 
 /// A thin rod through a plate: edges of the rod pass through the insides of two faces, and no
 /// vertex is near any face of the other body.
