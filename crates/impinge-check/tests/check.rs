@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use impinge::{Backend, Detector, Method, Query, Scene, Settings, SharedVertex};
 use impinge_check::{Counts, ErrorKind, Options, Problem, check_file, check_mesh};
 use impinge_io::{Elements, Mesh, Positions};
+use impinge_scenes::Random;
 use impinge_testing::data::test_file;
 
 fn triangles(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Mesh {
@@ -275,13 +276,8 @@ fn plainly(n_vertices: u32, faces: &[[u32; 3]]) -> [u64; 8] {
 
 #[test]
 fn random_meshes_agree_with_the_definitions() {
-    let mut state = 7u64;
-    let mut below = |n: u32| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) % u64::from(n)) as u32
-    };
+    let mut random = Random::new(7);
+    let mut below = |n| random.below(n);
     let mut seen = [0u64; 8];
     for _ in 0..400 {
         let n_vertices = 3 + below(8);
@@ -354,13 +350,8 @@ fn files_that_cannot_be_read_are_rows() {
 
 /// Corners on a lattice of so few points that most elements have copies, with corners in another
 /// order.
-fn crowd<const K: usize>(seed: &mut u64, n: usize, n_vertices: u32) -> Vec<[u32; K]> {
-    let mut below = |n: u32| {
-        *seed = seed
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (*seed >> 33) as u32 % n
-    };
+fn crowd<const K: usize>(random: &mut Random, n: usize, n_vertices: u32) -> Vec<[u32; K]> {
+    let mut below = |n| random.below(n);
     let mut all: Vec<[u32; K]> = Vec::new();
     while all.len() < n {
         let mut corners = match below(3) {
@@ -379,7 +370,8 @@ fn crowd<const K: usize>(seed: &mut u64, n: usize, n_vertices: u32) -> Vec<[u32;
 
 #[test]
 fn copies_are_counted_as_if_each_were_tested() {
-    let (mut seed, mut n_duplicates, mut n_pairs) = (3, 0, 0);
+    let mut random = Random::new(3);
+    let (mut n_duplicates, mut n_pairs) = (0, 0);
     for case in 0..120 {
         let n_vertices = 5 + case % 9;
         let at = |ix: u32, k: u32| f64::from((ix * 7 + k * k * 5 + ix * ix * k) % 4);
@@ -388,8 +380,8 @@ fn copies_are_counted_as_if_each_were_tested() {
         let mesh = Mesh {
             positions: Positions::F64(positions.collect()),
             elements: match case % 2 {
-                0 => Elements::Triangles(crowd(&mut seed, n, n_vertices)),
-                _ => Elements::Tetrahedra(crowd(&mut seed, n, n_vertices)),
+                0 => Elements::Triangles(crowd(&mut random, n, n_vertices)),
+                _ => Elements::Tetrahedra(crowd(&mut random, n, n_vertices)),
             },
         };
         let checked = check_mesh(mesh, &Options::default()).unwrap();

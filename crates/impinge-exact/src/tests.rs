@@ -9,18 +9,7 @@ use super::filter::{
 use super::tetrahedron::tetrahedra_intersect_by_signs;
 use super::triangle::triangles_intersect_by_signs;
 use super::{tetrahedra_intersect_beyond_shared, triangles_intersect_beyond_shared};
-
-/// A generator of small numbers.
-pub(crate) struct Numbers(pub u64);
-
-impl Numbers {
-    pub fn below(&mut self, n: u64) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) % n
-    }
-}
+use impinge_testing::random::Random;
 
 impl TrianglePairs8 {
     /// Puts a pair into a lane.
@@ -178,57 +167,39 @@ fn in_all_lanes(
     }
 }
 
-/// Pseudo-random bits: splitmix64.
-struct Random(u64);
+/// Random points in the unit cube.
+fn plain<const N: usize>(random: &mut Random) -> [Point; N] {
+    [(); N].map(|()| [(); 3].map(|()| random.unit().into()))
+}
 
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// A number in [0, 1) with 24 bits.
-    fn unit(&mut self) -> f64 {
-        (self.bits() >> 40) as f64 / f64::from(1 << 24)
-    }
-
-    /// Random points in the unit cube.
-    fn plain<const N: usize>(&mut self) -> [Point; N] {
-        [(); N].map(|()| [(); 3].map(|()| self.unit()))
-    }
-
-    /// Points that make many determinants zero, or nearly zero.
-    fn troublesome<const N: usize>(&mut self) -> [Point; N] {
-        let kind = self.bits() % 6;
-        let far = [0.0, 1e6, 1e30][(self.bits() % 3) as usize];
-        // A lattice of one plane in no special position; in `f32` nearly so.
-        let n_bits = [20, 50][(self.bits() % 2) as usize];
-        let axes = [(); 2].map(|()| [(); 3].map(|()| (self.bits() >> (64 - n_bits)) as f64));
-        [(); N].map(|()| {
-            let steps = [(); 2].map(|()| (self.bits() % 4) as f64);
-            std::array::from_fn(|axis| {
-                let bits = self.bits();
-                let x = (bits % 3) as f64;
-                let ulps = ((bits >> 32) % 3) as f64;
-                match kind {
-                    0 => x,
-                    1 => x * 0.1 + f64::EPSILON * ulps,
-                    2 => x * 0.1 + f64::from(f32::EPSILON) / 16.0 * ulps,
-                    3 => x + far * ((bits >> 16) % 2) as f64,
-                    4 => steps[0] * axes[0][axis] + steps[1] * axes[1][axis],
-                    _ => loop {
-                        let any = f32::from_bits(self.bits() as u32);
-                        if any.is_finite() {
-                            break f64::from(any);
-                        }
-                    },
-                }
-            })
+/// Points that make many determinants zero, or nearly zero.
+fn troublesome<const N: usize>(random: &mut Random) -> [Point; N] {
+    let kind = random.bits() % 6;
+    let far = [0.0, 1e6, 1e30][(random.bits() % 3) as usize];
+    // A lattice of one plane in no special position; in `f32` nearly so.
+    let n_bits = [20, 50][(random.bits() % 2) as usize];
+    let axes = [(); 2].map(|()| [(); 3].map(|()| (random.bits() >> (64 - n_bits)) as f64));
+    [(); N].map(|()| {
+        let steps = [(); 2].map(|()| (random.bits() % 4) as f64);
+        std::array::from_fn(|axis| {
+            let bits = random.bits();
+            let x = (bits % 3) as f64;
+            let ulps = ((bits >> 32) % 3) as f64;
+            match kind {
+                0 => x,
+                1 => x * 0.1 + f64::EPSILON * ulps,
+                2 => x * 0.1 + f64::from(f32::EPSILON) / 16.0 * ulps,
+                3 => x + far * ((bits >> 16) % 2) as f64,
+                4 => steps[0] * axes[0][axis] + steps[1] * axes[1][axis],
+                _ => loop {
+                    let any = f32::from_bits(random.bits() as u32);
+                    if any.is_finite() {
+                        break f64::from(any);
+                    }
+                },
+            }
         })
-    }
+    })
 }
 
 /// Compares a verdict with the truth, lane by lane; returns the number of settled lanes.
@@ -258,12 +229,12 @@ fn triangle_batch(
 
 #[test]
 fn filter_settles_random_triangles_and_is_right() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let (mut n_settled, mut n_rejected, mut n_yes) = (0, 0, 0);
     let n_batches = 2000;
     for _ in 0..n_batches {
         let (pairs, truth) = triangle_batch(
-            || (random.plain(), random.plain()),
+            || (plain(&mut random), plain(&mut random)),
             triangles_intersect_by_signs,
         );
         let say = |lane| format!("{:?}", pairs.get(lane));
@@ -300,13 +271,13 @@ fn filter_settles_random_triangles_and_is_right() {
 
 #[test]
 fn filter_is_never_wrong_on_troublesome_triangles() {
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     let mut n_settled = 0;
     let n_batches = 10_000;
     for _ in 0..n_batches {
         let (pairs, truth) = triangle_batch(
             || {
-                let [a, b, c, d, e, f] = random.troublesome();
+                let [a, b, c, d, e, f] = troublesome(&mut random);
                 ([a, b, c], [d, e, f])
             },
             triangles_intersect_by_signs,
@@ -325,12 +296,12 @@ fn filter_is_never_wrong_on_troublesome_triangles() {
 
 #[test]
 fn filter_in_f32_settles_random_triangles_and_is_right() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     // The largest coordinates, the usual ones, and some whose determinants nearly underflow.
     for (scale, share_settled) in [(2.0f64.powi(24), 95), (1.0, 95), (2.0f64.powi(-18), 80)] {
         let scaled = |point: Point| point.map(|x| x * scale);
         let (n_settled, n_yes) =
-            check_in_tables(&mut random, 1000, |random| random.plain().map(scaled));
+            check_in_tables(&mut random, 1000, |random| plain(random).map(scaled));
         let n = 1000 * BATCH as u32;
         assert!(
             n_settled * 100 > n * share_settled && n_yes > n / 20,
@@ -339,20 +310,20 @@ fn filter_in_f32_settles_random_triangles_and_is_right() {
     }
     // Where everything underflows, every pair is unsure.
     let scale = 2.0f64.powi(-120);
-    let tiny = |random: &mut Random| random.plain().map(|point| point.map(|x| x * scale));
+    let tiny = |random: &mut Random| plain(random).map(|point| point.map(|x| x * scale));
     assert_eq!(check_in_tables(&mut random, 100, tiny), (0, 0));
 }
 
 #[test]
 fn filter_in_f32_is_never_wrong_on_troublesome_triangles() {
-    let mut random = Random(12);
+    let mut random = Random::new(12);
     let within = |point: Point| {
         let largest = f64::from(filter::LARGEST_F32);
         point.map(|x| x.clamp(-largest, largest))
     };
     let n_batches = 3000;
     let (n_settled, _) = check_in_tables(&mut random, n_batches, |random| {
-        random.troublesome().map(within)
+        troublesome(random).map(within)
     });
     let n = n_batches * BATCH as u32;
     assert!(
@@ -377,16 +348,16 @@ fn filter_in_f32_is_never_wrong_on_troublesome_triangles() {
 
 #[test]
 fn filter_is_right_on_triangles_that_share_a_vertex_or_an_edge() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let n_batches = 4000;
-    for troublesome in [false, true] {
+    for is_troublesome in [false, true] {
         let (mut n_vertex, mut n_edge, mut n_yes) = (0, 0, 0);
         for _ in 0..n_batches {
             let mut points = || -> [Point; 5] {
-                if troublesome {
-                    random.troublesome()
+                if is_troublesome {
+                    troublesome(&mut random)
                 } else {
-                    random.plain()
+                    plain(&mut random)
                 }
             };
             let (pairs, truth) = triangle_batch(
@@ -422,7 +393,7 @@ fn filter_is_right_on_triangles_that_share_a_vertex_or_an_edge() {
         }
         let n = n_batches * LANES as u32;
         assert!(n_yes > n / 200, "{n_yes} of {n} meet");
-        if !troublesome {
+        if !is_troublesome {
             assert!(n_vertex * 1000 > n * 999, "only {n_vertex} of {n} settled");
             assert!(n_edge * 1000 > n * 999, "only {n_edge} of {n} settled");
         }
@@ -438,11 +409,11 @@ fn beyond_vertex_by_signs(a: &[Point; 3], b: &[Point; 3]) -> bool {
 
 #[test]
 fn filter_settles_random_tetrahedra_and_is_right() {
-    let mut random = Random(4);
+    let mut random = Random::new(4);
     let (mut n_settled, mut n_by_faces, mut n_by_edges, mut n_yes) = (0, 0, 0, 0);
     let n = 4000;
     for _ in 0..n {
-        let (a, mut b) = (random.plain(), random.plain());
+        let (a, mut b) = (plain(&mut random), plain(&mut random));
         b.iter_mut().for_each(|point: &mut Point| point[0] += 0.3);
         let truth = tetrahedra_intersect_by_signs(&a, &b);
         let answer = tetrahedra_answer(&a, &b);
@@ -473,10 +444,10 @@ fn filter_settles_random_tetrahedra_and_is_right() {
 
 #[test]
 fn filter_is_never_wrong_on_troublesome_tetrahedra() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let mut n_settled = 0;
     for _ in 0..20_000 {
-        let [a, b, c, d, e, f, g, h] = random.troublesome();
+        let [a, b, c, d, e, f, g, h] = troublesome(&mut random);
         let (a, b) = ([a, b, c, d], [e, f, g, h]);
         for classify in [classify_by_faces, classify_tetrahedra] {
             if let Some(answer) = in_all_lanes(classify, &a, &b) {

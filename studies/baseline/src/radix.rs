@@ -139,22 +139,20 @@ impl Radix {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use impinge_scenes::Random;
 
     #[test]
     fn sorts_as_the_standard_library_does() {
-        let mut state = 7u64;
-        let mut next = move || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
-            state >> 33
-        };
+        let mut random = Random::new(7);
         let mut radix = Radix::default();
         for threads in [1, 2, 3] {
             let workers = Workers::new(threads);
             let mut scratches = vec![(); workers.n()];
             for n_cells in [1, 2, 3, 256, 257, 5000, 1 << 22, (1 << 25) - 3] {
                 for n in [0u64, 1, 2, 1000, 100_000] {
-                    let mut entries: Vec<u64> =
-                        (0..n).map(|ix| (next() % n_cells) << 32 | ix).collect();
+                    let mut entries: Vec<u64> = (0..n)
+                        .map(|ix| (random.bits() % n_cells) << 32 | ix)
+                        .collect();
                     let mut expected = entries.clone();
                     expected.sort_unstable();
                     radix.sort(&mut entries, n_cells, &workers, &mut scratches);

@@ -224,18 +224,13 @@ fn nearest(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use impinge_testing::random::Random;
 
     #[test]
     fn boxes_between_hold_what_is_in_them() {
-        let mut state = 1u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            // Between -1 and 1, then of many sizes.
-            let x = (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0;
-            x * 2f32.powi((state >> 33 & 15) as i32 - 8)
-        };
+        let mut random = Random::new(1);
+        // Between -1 and 1, then of many sizes.
+        let mut next = || random.range(-1.0, 1.0) * 2f32.powi(random.below(16) as i32 - 8);
         for until in [1.0, 0.5, 0.1, 1e-3, 1e-9, 0.0] {
             for (inflation, is_swept) in [(0.0, false), (0.0, true), (0.25, true), (1e-9, true)] {
                 let sweep = Sweep {

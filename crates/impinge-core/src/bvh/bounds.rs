@@ -270,17 +270,12 @@ impl RawBoundsArray {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use impinge_testing::random::Random;
 
     #[test]
     fn roundings_are_the_nearest_on_either_side() {
-        let mut state = 1u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            state
-        };
-        let of_any_size = (0..100_000).map(|_| f64::from_bits(next()));
+        let mut random = Random::new(1);
+        let of_any_size = (0..100_000).map(|_| f64::from_bits(random.bits()));
         let small = [0.0, f64::MIN_POSITIVE, 1e-300, 1e-45, 1e-46, 1.2e-38, 1e-40];
         let large = [f64::from(f32::MAX), 3.5e38, f64::MAX, f64::INFINITY];
         let near_one = [1.0, 1.0 + f64::EPSILON, 1.0 - f64::EPSILON, 1.5];

@@ -164,6 +164,7 @@ mod tests {
     use crate::bvh::grid::{Grid, owns};
     use crate::query::settings::InstructionSet;
     use crate::scene::index::{ElementIx, PartIx};
+    use impinge_testing::random::Random;
 
     #[test]
     fn partners_are_those_of_the_occupancy_bits() {
@@ -173,17 +174,13 @@ mod tests {
         };
         let grid = Grid::new(&region, 27, 1.0);
         assert_eq!(grid.resolution, [3; 3]);
-        let mut state = 5u64;
-        let mut random = |n: u64| {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
-            (state >> 33) % n
-        };
+        let mut random = Random::new(5);
         let kept: Vec<InRegion> = ElementIx::up_to(400)
             .map(|element| {
-                let min: [f32; 3] = std::array::from_fn(|_| random(30) as f32 / 10.0);
+                let min: [f32; 3] = std::array::from_fn(|_| random.below(30) as f32 / 10.0);
                 let bounds = Aabb {
                     min,
-                    max: min.map(|x| x + random(14) as f32 / 10.0),
+                    max: min.map(|x| x + random.below(14) as f32 / 10.0),
                 };
                 InRegion {
                     bounds,

@@ -219,6 +219,7 @@ impl Run {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use impinge_testing::random::Random;
 
     /// Divides until no run has too many.
     fn divide(ranges: KeyRanges, keys: &[(PairKind, u64)], most: u64, runs: &mut Vec<Run>) {
@@ -236,13 +237,8 @@ mod tests {
 
     #[test]
     fn runs_hold_every_key_once_and_in_order() {
-        let mut state = 1u64;
-        let mut next = |below: u64| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 33) % below
-        };
+        let mut random = Random::new(1);
+        let mut next = |below: u32| u64::from(random.below(below));
         let mut whole = KeyRanges::default();
         // Ranges that end where a part does, and ones that do not; one key; the highest number.
         whole.0[PairKind::VertexFace as usize] = 5 << 32..u64::from(u32::MAX) << 32;
@@ -252,9 +248,8 @@ mod tests {
         for _ in 0..3000 {
             let n_vertices = match next(2) {
                 0 => 3,
-                _ => u64::from(u32::MAX) - 5,
+                _ => u32::MAX - 5,
             };
-            // Below 2^31, as all that `next` gives.
             let vertex = 5 + next(n_vertices);
             keys.push((PairKind::VertexFace, vertex << 32 | next(1 << 31)));
             keys.push((PairKind::EdgeEdge, (7 << 32) + next(1 << 20)));

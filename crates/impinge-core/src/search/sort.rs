@@ -385,18 +385,14 @@ fn sort_lanes(rows: &mut [Row]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use impinge_testing::random::Random;
 
     #[test]
     fn keys_are_sorted_as_in_place() {
         let from = Settings::default().tuning.sort_from;
         let mut sorter = Sorter::new(&Settings::default());
-        let mut state = 1u64;
-        let mut next = |below: u64| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 33) % below
-        };
+        let mut random = Random::new(1);
+        let mut next = |below: u32| u64::from(random.below(below));
         for threads in [1, 3] {
             let workers = Workers::new(threads);
             // Few keys; many; many of few numbers; more numbers than keys.
@@ -409,7 +405,7 @@ mod tests {
                 (from, 100_000),
             ] {
                 let first = Number::new(7);
-                let end = Number::new(7 + n_numbers as u32);
+                let end = Number::new(7 + n_numbers);
                 let keys = (0..n_keys).map(|_| (7 + next(n_numbers)) << 32 | next(1 << 30));
                 let mut keys: Vec<u64> = keys.collect();
                 let mut expected = keys.clone();

@@ -92,6 +92,7 @@ pub fn unit_of(x: f64) -> Option<i64> {
 mod tests {
     use super::*;
     use dashu_int::IBig;
+    use impinge_testing::random::Random;
 
     fn big(x: &Integer) -> IBig {
         let magnitude = x
@@ -111,39 +112,25 @@ mod tests {
         })
     }
 
-    /// A generator of awkward numbers.
-    struct Numbers(u64);
-
-    impl Numbers {
-        fn next(&mut self) -> u64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            self.0
-        }
-
-        fn integer(&mut self) -> Integer {
-            let n = self.next() % 5;
-            let limbs = (0..n)
-                .map(|_| match self.next() % 4 {
-                    0 => 0,
-                    1 => u64::MAX,
-                    _ => self.next(),
-                })
-                .collect::<Vec<u64>>();
-            let number = of_limbs(&limbs);
-            match self.next().is_multiple_of(2) {
-                true => -&number,
-                false => number,
-            }
+    /// An awkward number.
+    fn integer(random: &mut Random) -> Integer {
+        let limbs = (0..random.below(5)).map(|_| match random.below(4) {
+            0 => 0,
+            1 => u64::MAX,
+            _ => random.bits(),
+        });
+        let number = of_limbs(&Vec::from_iter(limbs));
+        match random.below(2) {
+            0 => -&number,
+            _ => number,
         }
     }
 
     #[test]
     fn sums_and_products() {
-        let mut numbers = Numbers(1);
+        let mut random = Random::new(1);
         for _ in 0..20_000 {
-            let (a, b) = (numbers.integer(), numbers.integer());
+            let (a, b) = (integer(&mut random), integer(&mut random));
             assert_eq!(big(&(&a + &b)), big(&a) + big(&b));
             assert_eq!(big(&(&a - &b)), big(&a) - big(&b));
             assert_eq!(big(&(&a * &b)), big(&a) * big(&b));
@@ -153,9 +140,9 @@ mod tests {
 
     #[test]
     fn numbers_in_units() {
-        let mut numbers = Numbers(2);
+        let mut random = Random::new(2);
         for _ in 0..2_000 {
-            let x = f64::from_bits(numbers.next());
+            let x = f64::from_bits(random.bits());
             if !x.is_finite() {
                 continue;
             }
@@ -181,17 +168,17 @@ mod tests {
     /// No number with 53 bits lies nearer; of two equally near, the result is the even one.
     #[test]
     fn quotients_are_the_nearest() {
-        let mut numbers = Numbers(3);
+        let mut random = Random::new(3);
         for round in 0..20_000 {
-            let mut a = numbers.integer();
-            let b = numbers.integer().abs();
+            let mut a = integer(&mut random);
+            let b = integer(&mut random).abs();
             if b.is_zero() {
                 continue;
             }
             if round % 3 == 0 {
                 // A tie, or next to one: an odd number of 54 bits.
-                let tie = Integer::from(numbers.next() >> 10 | 1 | 1 << 53);
-                let more = Integer::from(numbers.next() % 2);
+                let tie = Integer::from(random.bits() >> 10 | 1 | 1 << 53);
+                let more = Integer::from(random.bits() % 2);
                 a = &b * &tie;
                 a = if round % 2 == 0 {
                     &a - &more

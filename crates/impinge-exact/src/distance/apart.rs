@@ -386,20 +386,10 @@ mod tests {
     use super::*;
     use crate::distance::{are_within, first_within};
     use crate::rounding::power_of_two;
+    use impinge_testing::random::Random;
 
-    /// Numbers that look random.
-    struct Numbers(u64);
-
-    impl Numbers {
-        fn next(&mut self, n: u64) -> f64 {
-            let next = self.0.wrapping_mul(6_364_136_223_846_793_005);
-            self.0 = next.wrapping_add(1);
-            ((self.0 >> 33) % n) as f64
-        }
-
-        fn point(&mut self, n: u64, scale: f64) -> Point {
-            [(); 3].map(|()| (self.next(2 * n + 1) - n as f64) * scale)
-        }
+    fn point(random: &mut Random, n: u32, scale: f64) -> Point {
+        [(); 3].map(|()| (f64::from(random.below(2 * n + 1)) - f64::from(n)) * scale)
     }
 
     const PAIRS: [ElementPair; 4] = [
@@ -411,12 +401,12 @@ mod tests {
 
     #[test]
     fn what_is_stopped_never_comes_within_the_distance() {
-        let mut numbers = Numbers(7);
+        let mut random = Random::new(7);
         let (mut n_free, mut n_stopped) = (0, 0);
         for round in 0..20_000 {
             let pair = PAIRS[round % 4];
             let scale = [1.0, 0.1, 1e-3][round / 4 % 3];
-            let [start, end] = [(); 2].map(|()| [(); 4].map(|()| numbers.point(4, scale)));
+            let [start, end] = [(); 2].map(|()| [(); 4].map(|()| point(&mut random, 4, scale)));
             let distance = [0.0, 0.25, 0.7][round % 3] * scale;
             let Some(shares) = shares_apart(pair, [&start, &end, &end], distance) else {
                 // They are near, but for rounding.
@@ -449,33 +439,33 @@ mod tests {
     /// moves them.
     #[test]
     fn planes_at_rest_part_elements_wherever_their_points_stop() {
-        let mut numbers = Numbers(19);
+        let mut random = Random::new(19);
         let (mut n_apart, mut n_met, mut n_none) = (0, 0, 0);
         for round in 0..20_000 {
             let pair = PAIRS[round % 4];
             let scale = [1.0, 0.1, 1e-3][round / 4 % 3];
-            let [start, end] = [(); 2].map(|()| [(); 4].map(|()| numbers.point(4, scale)));
+            let [start, end] = [(); 2].map(|()| [(); 4].map(|()| point(&mut random, 4, scale)));
             let distance = [0.0, 0.25, 0.7][round % 3] * scale;
             let rounded = [0.0, 1e-6, 1e-3, 0.02][round / 7 % 4] * scale;
             // A point on its way, off by what rounding takes.
-            let at = |shares: &[f64; 4], numbers: &mut Numbers| -> [Point; 4] {
+            let at = |shares: &[f64; 4], random: &mut Random| -> [Point; 4] {
                 core::array::from_fn(|ix| {
-                    let off = numbers.point(8, rounded / 8.0);
+                    let off = point(random, 8, rounded / 8.0);
                     core::array::from_fn(|k| {
                         start[ix][k] + shares[ix] * (end[ix][k] - start[ix][k]) + off[k]
                     })
                 })
             };
-            let now = at(&[1.0; 4], &mut numbers);
+            let now = at(&[1.0; 4], &mut random);
             let Some(shares) = shares_at_rest(pair, [&start, &now, &end], distance, rounded) else {
                 n_none += 1;
                 continue;
             };
             for _ in 0..4 {
                 // Of points that stay where they are now, and of those that go back: any share.
-                let less = [(); 4].map(|()| numbers.next(1025) / 1024.0);
+                let less = [(); 4].map(|()| f64::from(random.below(1025)) / 1024.0);
                 let taken = core::array::from_fn(|ix| shares[ix] * [1.0, less[ix]][round / 2 % 2]);
-                let mut to = at(&taken, &mut numbers);
+                let mut to = at(&taken, &mut random);
                 for ix in 0..4 {
                     if taken[ix] == 1.0 {
                         to[ix] = now[ix];
@@ -499,10 +489,10 @@ mod tests {
     /// Squares of such sizes overflow or underflow, and shares are the same.
     #[test]
     fn shares_do_not_depend_on_the_size() {
-        let mut numbers = Numbers(11);
+        let mut random = Random::new(11);
         for round in 0..400 {
             let pair = PAIRS[round % 4];
-            let [start, now, end] = [(); 3].map(|()| [(); 4].map(|()| numbers.point(4, 1.0)));
+            let [start, now, end] = [(); 3].map(|()| [(); 4].map(|()| point(&mut random, 4, 1.0)));
             let distance = [0.0, 0.25][round / 4 % 2];
             let both = |exponent: i32| {
                 let size = power_of_two(exponent);
@@ -574,12 +564,12 @@ mod tests {
     /// towards the other element if there are any.
     #[test]
     fn without_room_points_go_back_until_the_elements_are_apart() {
-        let mut numbers = Numbers(3);
+        let mut random = Random::new(3);
         let (mut n_contacts, mut n_left) = (0, 0);
         for round in 0..4000 {
             let pair = PAIRS[round % 4];
             let scale = [1.0, 0.1, 1e-3][round / 4 % 3];
-            let [start, end] = [(); 2].map(|()| [(); 4].map(|()| numbers.point(40, scale)));
+            let [start, end] = [(); 2].map(|()| [(); 4].map(|()| point(&mut random, 40, scale)));
             // The elements are farther apart than their rounded distance less a bit.
             let distance = crate::closest_points(pair, &start).distance.next_down();
             if distance <= 0.0 || shares_apart(pair, [&start, &end, &end], distance).is_some() {

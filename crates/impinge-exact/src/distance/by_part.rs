@@ -320,7 +320,8 @@ mod tests {
     use crate::distance::filter::part_number;
     use crate::filter::number;
     use crate::filter::{Points8, bounds_and_parts};
-    use crate::tests::{Numbers, on_all};
+    use crate::tests::on_all;
+    use impinge_testing::random::Random;
 
     type Bits = (crate::NearestFeatures, u64, [[u64; 3]; 2]);
 
@@ -362,7 +363,7 @@ mod tests {
     /// nearly degenerate: what registers say is what integers say, of every part of a polygon.
     #[test]
     fn as_integers_say() {
-        let mut numbers = Numbers(99);
+        let mut random = Random::new(99);
         let mut pairs = Vec::new();
         // Of corners, edges and faces: how many there are, and how many are certain.
         let mut n = [[0usize; 2]; 3];
@@ -371,7 +372,7 @@ mod tests {
             let n_bits = [2, 4, 17, 23, 40, 52][round % 6];
             let far = [0.0, 0.0, 0.5, 30.0, 1e6][round / 30 % 5];
             let mut number = || {
-                let whole = numbers.below(2 << n_bits) as f64 / (1u64 << n_bits) as f64;
+                let whole = (random.bits() % (2 << n_bits)) as f64 / (1u64 << n_bits) as f64;
                 size * (whole - 1.0)
             };
             let mut points: [Point; 4] = [(); 4].map(|()| [(); 3].map(|()| number()));
@@ -428,13 +429,13 @@ mod tests {
     /// Faces of lattices and points over them: distances and shares are floats.
     #[test]
     fn of_lattices() {
-        let mut numbers = Numbers(5);
+        let mut random = Random::new(5);
         let mut n = [0; 2];
         for _ in 0..4_000 {
             let mut pairs = Vec::new();
             while pairs.len() < 8 {
                 let points: [Point; 4] =
-                    [(); 4].map(|()| [(); 3].map(|()| numbers.below(8) as f64));
+                    [(); 4].map(|()| [(); 3].map(|()| f64::from(random.below(8))));
                 let pair = ElementPair::VertexFace;
                 let part = part_number(pair, &points);
                 pairs.push(PairAtPart { pair, points, part });
@@ -456,12 +457,13 @@ mod tests {
     /// Bounds and parts of eight pairs are those of one after the other.
     #[test]
     fn parts_of_eight() {
-        let mut numbers = Numbers(3);
+        let mut random = Random::new(3);
         for round in 0..2_000 {
             let pair = [ElementPair::VertexFace, ElementPair::EdgeEdge][round % 2];
             let all: [[Point; 4]; LANES] = [(); LANES].map(|()| {
-                [(); 4]
-                    .map(|()| [(); 3].map(|()| numbers.below([9, 1 << 30][round / 2 % 2]) as f64))
+                [(); 4].map(|()| {
+                    [(); 3].map(|()| f64::from(random.below([9, 1 << 30][round / 2 % 2])))
+                })
             });
             let mut points = Points8::default();
             for (lane, of_lane) in all.iter().enumerate() {

@@ -313,7 +313,7 @@ fn rounded_of(pair: ElementPair, [start, end]: [&[Point; 4]; 2], unit: f64) -> f
 mod tests {
     use super::*;
     use crate::closest_points;
-    use crate::sweep::tests::Random;
+    use impinge_testing::random::Random;
 
     fn keep(separation: f64, clearance: f64, share: f64) -> Keep {
         Keep {
@@ -413,7 +413,7 @@ mod tests {
     /// On a small lattice, where pairs begin and end in touch, or as far apart as they may come.
     #[test]
     fn whether_elements_come_near_does_not_depend_on_when_they_do() {
-        let mut random = Random(7);
+        let mut random = Random::new(7);
         let pairs = [
             ElementPair::VertexVertex,
             ElementPair::VertexEdge,
@@ -423,7 +423,7 @@ mod tests {
         let mut n_at_end_alone = 0;
         for round in 0..20_000 {
             let pair = pairs[round % 4];
-            let mut at = || [(); 4].map(|()| [(); 3].map(|()| random.below(4) as f64));
+            let mut at = || [(); 4].map(|()| [(); 3].map(|()| f64::from(random.below(4))));
             let ends = [at(), at()];
             let keep = [
                 keep(0.0, 0.0, 0.0),
@@ -467,13 +467,7 @@ mod tests {
     /// position.
     #[test]
     fn the_excess_does_not_depend_on_the_enclosure() {
-        let mut state = 1u64;
-        let mut random = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            f64::from((state >> 40) as u32) / f64::from(1 << 24)
-        };
+        let mut random = Random::new(1);
         let pairs = [
             ElementPair::VertexVertex,
             ElementPair::VertexEdge,
@@ -486,7 +480,7 @@ mod tests {
             points
                 .as_flattened_mut()
                 .iter_mut()
-                .for_each(|x| *x = scale * random());
+                .for_each(|x| *x = scale * f64::from(random.unit()));
             let pair = pairs[round % 4];
             let keep = keep(0.0, 1.0, 0.5);
             let bounds = filter::bounds(pair, &points);
@@ -501,16 +495,11 @@ mod tests {
     /// Positions as floats give them are no farther from the way than the number says.
     #[test]
     fn rounding_moves_positions_by_less() {
-        let mut state = 7u64;
-        let mut random = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            f64::from((state >> 32) as u32) / f64::from(1u32 << 31) - 1.0
-        };
+        let mut random = Random::new(7);
+        let mut next = || random.range(-1.0, 1.0);
         let mut most: f64 = 0.0;
         for _ in 0..100_000 {
-            let (x0, dx, a) = (random() as f32, random() as f32, random().abs() as f32);
+            let (x0, dx, a) = (next(), next(), next().abs());
             let x1 = x0 + dx;
             let unit = 2f64.powi(-24);
             let bound = moved_by_rounding(f64::from(x0.abs().max(x1.abs())), unit);

@@ -10,9 +10,10 @@ use crate::filter::{
     nearest_in_tables, number, stay_beyond_in_tables, time_between,
 };
 use crate::rounding::power_of_two;
-use crate::sweep::tests::{KINDS, Kind, PAIRS, Random, Step, in_tables, step};
+use crate::sweep::tests::{KINDS, Kind, PAIRS, Step, in_tables, step};
 use crate::tests::on_all;
 use crate::{Contact, ElementPair, Point};
+use impinge_testing::random::Random;
 
 /// Sixteen pairs in tables, and what is asked of them.
 struct Asked {
@@ -65,7 +66,7 @@ on_all!(f32: fn answer_of_all(asked: &Asked) -> (Near16, u16, Bounded16) = Asked
 /// A distance that some of the elements have at the start or at the end, or one next to it, or
 /// another one.
 fn distance(pair: ElementPair, steps: &[Step], kind: Kind, random: &mut Random) -> f64 {
-    let step = &steps[random.below(BATCH as u64) as usize];
+    let step = &steps[random.below(BATCH as u32) as usize];
     let found = closest_points(pair, &step[random.below(2) as usize]).distance;
     match random.below(6) {
         0 => found,
@@ -74,7 +75,7 @@ fn distance(pair: ElementPair, steps: &[Step], kind: Kind, random: &mut Random) 
         3 => f64::from(found as f32),
         4 => found * 0.75,
         _ if matches!(kind, Kind::Extreme) => found * 1.5,
-        _ => 0.25 * random.below(8) as f64,
+        _ => 0.25 * f64::from(random.below(8)),
     }
 }
 
@@ -84,7 +85,7 @@ fn is_in_time(contact: Option<Contact>, until: f64) -> bool {
 
 #[test]
 fn filters_never_contradict_integers_and_roots() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for kind in KINDS {
         for pair in PAIRS {
             let (mut n_sure, mut n_open, mut n_near, mut n_kept) = (0, 0, 0, 0);
@@ -198,7 +199,7 @@ fn beside_the_end(pair: ElementPair, mut points: [Point; 4]) -> [Point; 4] {
 
 #[test]
 fn nearest_parts_by_certain_signs_are_those_of_integers() {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for kind in KINDS {
         for pair in PAIRS {
             let (mut n_known, mut n_unknown, mut n_in_f64) = (0, 0, 0);
@@ -261,15 +262,15 @@ fn nearest_parts_by_certain_signs_are_those_of_integers() {
 
 /// Numbers of up to 61 bits: all that fixed width takes.
 fn long(bits: u32, random: &mut Random) -> f64 {
-    let whole = random.below(1 << bits.min(53)) as f64;
+    let whole = (random.bits() % (1 << bits.min(53))) as f64;
     let sign = [1.0, -1.0][random.below(2) as usize];
-    sign * whole * 2.0_f64.powi(random.below(u64::from(bits) - 52) as i32 - 40)
+    sign * whole * 2.0_f64.powi(random.below(bits - 52) as i32 - 40)
 }
 
 #[test]
 fn integers_of_fixed_width_answer_as_those_of_any_size() {
     use super::rounded::closest_of;
-    let mut random = Random(6);
+    let mut random = Random::new(6);
     let (mut n_short, mut n_long) = (0, 0);
     let mut check = |pair: ElementPair, points: &[Point; 4], d: f64| {
         let case = || format!("{pair:?} {points:?} {d:?}");
@@ -401,16 +402,17 @@ fn gaps_are_below_by_little_and_zero_where_elements_are_within() {
         ElementPair::VertexFace,
         ElementPair::EdgeEdge,
     ];
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let (mut n_within, mut n_small) = (0, 0);
     for round in 0..4000 {
         let pair = pairs[round % 4];
         let scale = [1.0, 0.1, 1e-7][round / 4 % 3];
-        let points = [(); 4].map(|()| [(); 3].map(|()| scale * (random.unit() - 0.5)));
+        let mut number = || scale * f64::from(random.range(-1.5, 0.5));
+        let points = [(); 4].map(|()| [(); 3].map(|()| number()));
         let distance = closest_points(pair, &points).distance;
         let near = [0.0, 1.0, -1.0, 3.0, -900.0, 1e6, -1e9, -1e14][round / 12 % 8];
         let sum = distance * (1.0 + near * f64::EPSILON);
-        let first = sum * random.unit().abs();
+        let first = sum * f64::from(random.unit());
         let thickness = match round % 3 {
             0 => [first, sum - first],
             1 => [sum, 0.0],
@@ -446,12 +448,12 @@ fn gaps_are_below_by_little_and_zero_where_elements_are_within() {
 /// arithmetic, which takes a thousand times as long.
 #[test]
 fn sizes_out_of_range_are_decided_in_floats() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let mut n_decided = 0;
     for round in 0..400 {
         let pair = PAIRS[round % PAIRS.len()];
-        let [start, end] =
-            [(); 2].map(|()| [(); 4].map(|()| [(); 3].map(|()| random.unit() - 0.5)));
+        let mut point = || [(); 3].map(|()| f64::from(random.range(-1.5, 0.5)));
+        let [start, end] = [(); 2].map(|()| [(); 4].map(|()| point()));
         let decided = |exponent: i32| {
             let size = power_of_two(exponent);
             let of = |points: &[Point; 4]| points.map(|point| point.map(|x| x * size));

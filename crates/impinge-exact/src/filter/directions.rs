@@ -450,14 +450,15 @@ mod tests {
     use super::super::number::Portable32;
     use super::*;
     use crate::internal::{Reach, elements_are_within};
-    use crate::sweep::tests::Random;
     use crate::triangles_intersect;
+    use impinge_testing::random::Random;
 
     /// Long elements of so many corners, some of them degenerate, in a space of some size.
     fn group<const N: usize>(random: &mut Random, size: f64, far: f64) -> Vec<[Point; N]> {
         (0..TABLE)
             .map(|lane| {
-                let mut point = || [(); 3].map(|()| far + size * random.unit());
+                let mut point =
+                    || [(); 3].map(|()| far + size * f64::from(random.range(-1.0, 1.0)));
                 let (start, way) = (point(), point());
                 // Slivers: the last corner is near the line of the others.
                 let mut corners = [start; N];
@@ -493,7 +494,7 @@ mod tests {
         distance: f32,
         is_near: impl Fn(&[Point; N], &[Point; M]) -> bool,
     ) -> [u32; 2] {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let (a, b) = (
             group::<N>(&mut random, size, far),
             group::<M>(&mut random, size, far),
@@ -547,7 +548,7 @@ mod tests {
 
     /// Slivers side by side, as on a shaft that lies aslant: each 1 long and 1e-4 wide.
     fn side_by_side(random: &mut Random) -> Vec<[Point; 3]> {
-        let mut point = || [(); 3].map(|()| random.unit());
+        let mut point = || [(); 3].map(|()| f64::from(random.range(-1.0, 1.0)));
         let (start, way, aside) = (point(), point(), point());
         (0..TABLE)
             .map(|lane| {
@@ -562,7 +563,7 @@ mod tests {
 
     #[test]
     fn elements_that_are_not_near_a_group_are_apart_from_all_of_it() {
-        let mut random = Random(7);
+        let mut random = Random::new(7);
         let (mut n_left_out, mut n_groups_apart) = (0, 0);
         for round in 0..200 {
             let a = side_by_side(&mut random);

@@ -1,11 +1,10 @@
 use super::*;
-use crate::tests::{Numbers, on_all};
+use crate::tests::on_all;
 use crate::triangle::segment_meets_triangle;
+use impinge_testing::random::Random;
 
-impl Numbers {
-    fn point(&mut self, low: i32, n: u64) -> Point {
-        [(); 3].map(|()| f64::from(low) + self.below(n) as f64)
-    }
+fn point(random: &mut Random, low: f64, n: u32) -> Point {
+    [(); 3].map(|()| low + f64::from(random.below(n)))
 }
 
 fn at(origin: &Point, direction: &Point, t: f64, scale: f64) -> Point {
@@ -47,15 +46,15 @@ fn holds_inside(corners: &[Point; 3], feature: Feature, point: &Point) -> bool {
 #[test]
 fn on_a_lattice() {
     const FINE: f64 = 1048576.0;
-    let mut numbers = Numbers(1);
+    let mut random = Random::new(1);
     // Misses, faces, edges, vertices, intervals.
     let mut n = [0usize; 5];
     for round in 0..200_000 {
         let size = 2 + round % 3;
-        let corners = [(); 3].map(|()| numbers.point(0, size));
-        let origin = numbers.point(-1, size + 2);
-        let direction = numbers.point(-1, 3);
-        let most = [0.0, 1.0, 2.0, 9.0, f64::INFINITY][numbers.below(5) as usize];
+        let corners = [(); 3].map(|()| point(&mut random, 0.0, size));
+        let origin = point(&mut random, -1.0, size + 2);
+        let direction = point(&mut random, -1.0, 3);
+        let most = [0.0, 1.0, 2.0, 9.0, f64::INFINITY][random.below(5) as usize];
         let far = at(
             &origin,
             &direction,
@@ -184,7 +183,7 @@ on_all!(f64: fn each_register(batch: &[(Ray, [Point; 3])]) -> Inside = meet_insi
 #[test]
 fn inside() {
     let mut batch = Vec::new();
-    let mut numbers = Numbers(77);
+    let mut random = Random::new(77);
     let mut n = [0; 4];
     for round in 0..60_004 {
         // Sizes that differ, numbers of few and of many bits, and rays that nearly lie in the
@@ -192,7 +191,7 @@ fn inside() {
         let size = [1.0, 1e-9, 1e12, 3e-31][round % 4];
         let bits = [4, 1 << 20, 1 << 40][round % 3];
         let far = [0.0, 0.0, 1000.0][round / 12 % 3];
-        let mut number = || size * (numbers.below(2 * bits) as f64 / bits as f64 - 1.0);
+        let mut number = || size * ((random.bits() % (2 * bits)) as f64 / bits as f64 - 1.0);
         let corners: [Point; 3] = [(); 3].map(|()| [(); 3].map(|()| number()));
         let origin = [number(), number(), number() + far * size];
         let shares = [number(), number(), number()].map(|x| (x / size).abs() + 1e-3);

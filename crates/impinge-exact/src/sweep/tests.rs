@@ -8,33 +8,12 @@ use crate::filter::{
     time_between,
 };
 use crate::tests::on_all;
+use impinge_testing::random::Random;
 
 pub(crate) const PAIRS: [ElementPair; 2] = [ElementPair::VertexFace, ElementPair::EdgeEdge];
 
 /// The corners of both elements at the start and at the end.
 pub(crate) type Step = [[Point; 4]; 2];
-
-pub(crate) struct Random(pub u64);
-
-impl Random {
-    /// splitmix64 (Steele, Lea, Flood 2014).
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// A number in [-1, 1) of 24 bits.
-    pub(crate) fn unit(&mut self) -> f64 {
-        (self.bits() >> 40) as f64 / f64::from(1 << 23) - 1.0
-    }
-
-    pub(crate) fn below(&mut self, n: u64) -> u64 {
-        self.bits() % n
-    }
-}
 
 /// How a step is made.
 #[derive(Clone, Copy, Debug)]
@@ -69,13 +48,13 @@ fn narrow(x: f64) -> f64 {
 /// A step whose coordinates are `f32`.
 pub(crate) fn step(kind: Kind, random: &mut Random) -> Step {
     let mut points = [[[0.0; 3]; 4]; 2];
-    let axes = [[(); 3]; 3].map(|axis| axis.map(|()| random.unit()));
+    let axes = [[(); 3]; 3].map(|axis| axis.map(|()| f64::from(random.range(-1.0, 1.0))));
     let scale = 2.0_f64.powi(random.below(160) as i32 - 120);
     #[allow(clippy::needless_range_loop)] // `points[0]` is read while `points[1]` is written.
     for end in 0..2 {
         for ix in 0..4 {
-            let lattice = [(); 3].map(|()| random.below(4) as f64);
-            let plain = [(); 3].map(|()| random.unit());
+            let lattice = [(); 3].map(|()| f64::from(random.below(4)));
+            let plain = [(); 3].map(|()| f64::from(random.range(-1.0, 1.0)));
             points[end][ix] = match kind {
                 Kind::Plain => plain,
                 Kind::Lattice => lattice,
@@ -207,7 +186,7 @@ fn is_in_time(contact: Option<Contact>, until: f64) -> bool {
 
 #[test]
 fn filter_never_contradicts_exact_roots() {
-    let mut random = Random(21);
+    let mut random = Random::new(21);
     for kind in KINDS {
         for pair in PAIRS {
             let (mut n_yes, mut n_no, mut n_unsure, mut n_rounded) = (0, 0, 0, 0);
@@ -282,7 +261,7 @@ fn filter_never_contradicts_exact_roots() {
 /// of it; without the margin, some of those touch.
 #[test]
 fn a_margin_covers_elements_that_are_off_their_ways() {
-    let mut random = Random(8);
+    let mut random = Random::new(8);
     for kind in [Kind::Plain, Kind::Close, Kind::Lattice, Kind::NearlyTied] {
         for pair in PAIRS {
             // Pairs that touch when they are off their ways: apart without the margin, in tables
@@ -351,7 +330,7 @@ fn a_margin_covers_elements_that_are_off_their_ways() {
 /// exactly zero at all times, and only its rounding error has a sign.
 #[test]
 fn filter_does_not_trust_the_rounding_error_of_an_area() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for pair in PAIRS {
         let mut n_unsure = 0;
         for _ in 0..200 {
@@ -377,7 +356,7 @@ fn filter_does_not_trust_the_rounding_error_of_an_area() {
 /// between two others, at time 1/2, in the plane of that edge and the normal. Coordinates are whole
 /// numbers below 2^53, and areas are not.
 fn meeting_at_a_border(pair: ElementPair, random: &mut Random) -> Step {
-    let mut corner = || [(); 3].map(|()| 2.0 * random.below(1 << 13) as f64);
+    let mut corner = || [(); 3].map(|()| 2.0 * f64::from(random.below(1 << 13)));
     let (start, end, third) = (corner(), corner(), corner());
     let edge: Point = std::array::from_fn(|k| end[k] - start[k]);
     let other: Point = std::array::from_fn(|k| third[k] - start[k]);
@@ -385,7 +364,7 @@ fn meeting_at_a_border(pair: ElementPair, random: &mut Random) -> Step {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
         edge[i] * other[j] - edge[j] * other[i]
     });
-    let along = random.below(1 << 10) as f64;
+    let along = f64::from(random.below(1 << 10));
     [-1.0, 1.0].map(|side| {
         let moving = std::array::from_fn(|k| {
             start[k] + 0.5 * edge[k] + side * (normal[k] + along * edge[k])

@@ -4,6 +4,7 @@
 use impinge_core::{
     Detector, Elements, Error, Method, Query, Scene, Settings, SharedVertex, Stats,
 };
+use impinge_scenes::Random;
 use impinge_tests::{Case, check, cpu, detector, naive};
 
 const RULES: [SharedVertex; 2] = [SharedVertex::Skip, SharedVertex::Resolve];
@@ -25,25 +26,9 @@ fn check_both(name: &str, elements: &Elements, positions: &[[f64; 3]]) {
     }
 }
 
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    fn below(&mut self, n: u64) -> u64 {
-        self.next() % n
-    }
-
-    fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
+/// A number from 0 to 1, 1 excluded, of 53 bits.
+fn unit(random: &mut Random) -> f64 {
+    (random.bits() >> 11) as f64 / (1u64 << 53) as f64
 }
 
 /// A fan around vertex 0 whose rim winds around it `turns` times; not closed.
@@ -59,19 +44,19 @@ fn fan(n: u32, turns: f64, height: impl Fn(f64) -> f64) -> (Vec<[u32; 3]>, Vec<[
 /// Elements over a few vertices on a small lattice; some vertices are named very often.
 fn lattice<const N: usize>(
     n: usize,
-    n_hubs: u64,
-    side: u64,
-    seed: u64,
+    n_hubs: u32,
+    side: u32,
+    seed: u32,
 ) -> (Vec<[u32; N]>, Vec<[f64; 3]>) {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed.into());
     let positions: Vec<[f64; 3]> = (0..60)
-        .map(|_| std::array::from_fn(|_| random.below(side) as f64))
+        .map(|_| std::array::from_fn(|_| random.below(side).into()))
         .collect();
     let elements = (0..n)
         .map(|_| {
             std::array::from_fn(|_| match random.below(2) {
-                0 => random.below(n_hubs) as u32,
-                _ => random.below(positions.len() as u64) as u32,
+                0 => random.below(n_hubs),
+                _ => random.below(positions.len() as u32),
             })
         })
         .collect();
@@ -85,14 +70,14 @@ fn fans_are_answered_as_by_the_oracle() {
         check_both("fan", &faces.into(), &positions);
     }
     // Triangles in random directions, two hubs, some vertices at the position of a hub.
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for spread in [0.05, 0.3, 1.0] {
         let mut positions = vec![[0.0; 3], [0.0, 0.0, 0.5]];
         let mut faces = Vec::new();
         for k in 0..320u32 {
-            let at: [f64; 3] = std::array::from_fn(|_| random.unit() - 0.5);
+            let at: [f64; 3] = std::array::from_fn(|_| unit(&mut random) - 0.5);
             for _ in 0..2 {
-                positions.push(at.map(|x| x + spread * (random.unit() - 0.5)));
+                positions.push(at.map(|x| x + spread * (unit(&mut random) - 0.5)));
             }
             let first = positions.len() as u32 - 2;
             if k % 40 == 0 {
@@ -106,17 +91,17 @@ fn fans_are_answered_as_by_the_oracle() {
 
 #[test]
 fn books_are_answered_as_by_the_oracle() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     for quarter_turns in [true, false] {
         let mut positions = vec![[0.25, -0.5, 0.125], [0.25, 1.5, 0.125]];
         for k in 0..300 {
             let angle = match quarter_turns {
-                true => std::f64::consts::FRAC_PI_2 * random.below(4) as f64,
-                false => std::f64::consts::TAU * random.unit(),
+                true => std::f64::consts::FRAC_PI_2 * f64::from(random.below(4)),
+                false => std::f64::consts::TAU * unit(&mut random),
             };
-            let along = 4.0 * random.unit() - 1.5;
+            let along = 4.0 * unit(&mut random) - 1.5;
             // Some vertices lie on the spine's line: before the spine, on it and behind it.
-            let out = if k % 5 == 0 { 0.0 } else { random.unit() };
+            let out = if k % 5 == 0 { 0.0 } else { unit(&mut random) };
             let (x, z) = (out * angle.cos(), out * angle.sin());
             positions.push([0.25 + x, along, 0.125 + z]);
         }

@@ -2,7 +2,7 @@
 
 use impinge_core::proximity::Nearest;
 use impinge_core::{Backend, BodyId, Detector, Filter, PairKind, Query, Scene, Settings};
-use impinge_scenes::{Model, adversarial, solids, soup, surfaces};
+use impinge_scenes::{Model, Random, adversarial, solids, soup, surfaces};
 use impinge_tests::times_power;
 
 fn scene(a: &Model, b: &Model) -> (Scene, [BodyId; 2]) {
@@ -539,16 +539,10 @@ fn distances_above_the_largest_float() {
 /// Of a hundred bodies, where few are named or the filters of few say so: as asked one by one.
 #[test]
 fn nearest_of_few_named_bodies_as_asked_one_by_one() {
-    let mut state = 5u64;
-    let mut below = |n: u64| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        (state >> 33) % n
-    };
+    let mut random = Random::new(5);
     let mut scene = Scene::new();
     let face = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    let mut at = || [(); 3].map(|()| below(24) as f32 / 2.0);
+    let mut at = || [(); 3].map(|()| random.below(24) as f32 / 2.0);
     let placed = |at: [f32; 3]| face.map(|point| [0, 1, 2].map(|k| point[k] + at[k]));
     let ids: Vec<BodyId> = (0..100)
         .map(|_| scene.add_triangles(&[[0, 1, 2]], &placed(at())).unwrap())

@@ -12,7 +12,7 @@ use impinge_core::{
     Stats, devices, wgpu,
 };
 use impinge_scenes::deform::{self, Deform};
-use impinge_scenes::{regular, soup, surfaces};
+use impinge_scenes::{Random, regular, soup, surfaces};
 use impinge_tests::{Case, agree, cases, check, naive, rows};
 
 /// Settings for the GPU. The first call opens a device and keeps it open, so that all tests share
@@ -412,11 +412,8 @@ fn few_pairs_are_left_to_exact_arithmetic() {
 /// Triangles over a few vertices: nearly all share one vertex with many others, and some share two
 /// or three.
 fn web(n: u32, n_vertices: u32, seed: u64) -> impinge_scenes::Model {
-    let mut state = seed;
-    let mut next = |below: u32| {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1);
-        ((state >> 33) % u64::from(below)) as u32
-    };
+    let mut random = Random::new(seed);
+    let mut next = |below| random.below(below);
     let mut model = soup::triangles(n_vertices as usize / 3, 1.0, seed);
     let faces: Vec<[u32; 3]> = (0..n)
         .map(|_| {
