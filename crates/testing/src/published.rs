@@ -1,7 +1,10 @@
 //! Published triangle pairs, from the shared data. `None` if the data is absent and
 //! `IMPINGE_NO_DATA=1` allows that.
 
+use std::path::Path;
+
 use crate::data::test_file;
+use crate::npy;
 
 /// A triangle as three corners.
 pub type Triangle = [[f64; 3]; 3];
@@ -57,21 +60,18 @@ pub fn special_pairs() -> Option<Vec<Published>> {
     Some(pairs)
 }
 
+/// The rows `[0, a, 1, b]` of a NumPy array file of pairs: a triangle of each of two bodies.
+pub fn rows_of_two_bodies(file: &Path) -> Vec<[u32; 4]> {
+    let pairs = npy::rows(&std::fs::read(file).unwrap(), "<u4", u32::from_le_bytes);
+    pairs.into_iter().map(|[a, b]| [0, a, 1, b]).collect()
+}
+
 /// The rows of a NumPy array file of shape (n, 6, 3), little-endian `f64`, in C order.
 fn triangle_pairs(bytes: &[u8]) -> Vec<[Triangle; 2]> {
-    assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00", "NumPy format 1.0");
-    let header_end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let header = std::str::from_utf8(&bytes[10..header_end]).expect("header in ASCII");
-    assert!(header.contains("'descr': '<f8'") && header.contains("'fortran_order': False"));
+    let rows = npy::rows::<_, 18, 8>(bytes, "<f8", f64::from_le_bytes);
+    let (header, _) = npy::split(bytes);
     assert!(header.contains(", 6, 3)"), "{header}");
-    let (numbers, rest) = bytes[header_end..].as_chunks::<8>();
-    assert!(rest.is_empty() && numbers.len() % 18 == 0);
-    let numbers: Vec<f64> = numbers
-        .iter()
-        .map(|bytes| f64::from_le_bytes(*bytes))
-        .collect();
-    numbers
-        .chunks_exact(18)
+    rows.iter()
         .map(|row| {
             std::array::from_fn(|side| {
                 std::array::from_fn(|vertex| {

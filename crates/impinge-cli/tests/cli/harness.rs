@@ -9,6 +9,7 @@ use std::time::UNIX_EPOCH;
 use impinge::{Detector, Elements, Method, Query, Scene, Settings};
 use impinge_io::{ColoredMesh, Positions, write_ply};
 use impinge_scenes::Model;
+use impinge_testing::npy;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -186,22 +187,14 @@ pub fn csv_rows(path: &Path) -> Vec<[u32; 4]> {
 
 /// Rows of a `.npy` file of little-endian u32 with shape `(n, 4)`.
 pub fn npy_rows(path: &Path) -> Vec<[u32; 4]> {
-    let bytes = std::fs::read(path).unwrap();
-    assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
-    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let header = std::str::from_utf8(&bytes[10..start]).unwrap();
-    let (rows, rest) = bytes[start..].as_chunks::<16>();
-    assert!(rest.is_empty());
-    assert!(header.contains("'descr': '<u4'") && header.contains("'fortran_order': False"));
+    let file = std::fs::read(path).unwrap();
+    let rows = npy::rows(&file, "<u4", u32::from_le_bytes);
+    let (header, _) = npy::split(&file);
     assert!(
         header.contains(&format!("'shape': ({}, 4)", rows.len())),
         "{header}"
     );
-    rows.iter()
-        .map(|row| {
-            std::array::from_fn(|k| u32::from_le_bytes(row[4 * k..][..4].try_into().unwrap()))
-        })
-        .collect()
+    rows
 }
 
 /// The keys of an object in their order.

@@ -3,6 +3,7 @@
 use impinge::{Backend, Detector, NearPair, PairKind, Query, Scene};
 use impinge_scenes::Model;
 use impinge_scenes::surfaces::{ball, cube};
+use impinge_testing::npy;
 
 use crate::harness::{Folder, rod_and_plate};
 use crate::schema::{schema, wrong};
@@ -114,14 +115,13 @@ fn rows_read_back_to_the_same_bits() {
 
     folder.run(near.iter().chain(&["near.npy"])).printed();
     let bytes = std::fs::read(folder.path("near.npy")).unwrap();
-    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let header = std::str::from_utf8(&bytes[10..start]).unwrap();
+    let (header, data) = npy::split(&bytes);
     let shape = format!("'shape': ({},)", pairs.len());
     assert!(header.contains(&shape), "{header}");
     // BodyKind, four numbers, type, two features, a byte, distance and points.
     let size = 8 + 16 + 28 + 16 + 1 + 8 + 48;
-    let rows: Vec<&[u8]> = bytes[start..].chunks_exact(size).collect();
-    assert_eq!(rows.len() * size, bytes.len() - start);
+    let rows: Vec<&[u8]> = data.chunks_exact(size).collect();
+    assert_eq!(rows.len() * size, data.len());
     assert_eq!(rows.len(), pairs.len());
     for (row, pair) in rows.iter().zip(&pairs) {
         let distance = f64::from_le_bytes(row[69..77].try_into().unwrap());

@@ -1,6 +1,7 @@
 //! `--rows` of every answer, in every format, and the last line, which says what was asked.
 
 use impinge_scenes::surfaces::{ball, cube};
+use impinge_testing::npy;
 use serde_json::Value;
 
 use crate::harness::Folder;
@@ -64,15 +65,10 @@ const ANSWERS: [(&[&str], &str); 6] = [
 
 /// The rows of a NumPy array, by its shape.
 fn n_of_npy(bytes: &[u8]) -> usize {
-    assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
-    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let header = std::str::from_utf8(&bytes[10..start]).unwrap();
+    let (header, data) = npy::split(bytes);
     let shape = header.split("'shape': (").nth(1).unwrap();
     let n = shape.split(',').next().unwrap().parse().unwrap();
-    assert!(
-        n == 0 || (bytes.len() - start).is_multiple_of(n),
-        "{header}"
-    );
+    assert!(n == 0 || data.len().is_multiple_of(n), "{header}");
     n
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use impinge_io::{Positions, ReadOptions, read};
 use impinge_scenes::Model;
 use impinge_testing::data::test_file;
+use impinge_testing::published::rows_of_two_bodies;
 use serde_json::{Value, json};
 
 use crate::harness::{Folder, npy_rows};
@@ -107,21 +108,11 @@ fn bunny_against_its_moved_copy() {
         assert_eq!(found, &answer[expected]);
     }
     if let Some(list) = file(answer["file"].as_str().unwrap()) {
-        assert_eq!(npy_rows(&folder.path("rows.npy")), published_rows(&list));
+        assert_eq!(
+            npy_rows(&folder.path("rows.npy")),
+            rows_of_two_bodies(&list)
+        );
     }
-}
-
-/// The committed list: `(n, 2)` integers of 32 bits, triangle of A, triangle of B.
-fn published_rows(path: &std::path::Path) -> Vec<[u32; 4]> {
-    let bytes = std::fs::read(path).unwrap();
-    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let header = std::str::from_utf8(&bytes[10..start]).unwrap();
-    assert!(header.contains("<i4") || header.contains("<u4"), "{header}");
-    let number = |bytes: &[u8]| u32::from_le_bytes(bytes.try_into().unwrap());
-    bytes[start..]
-        .chunks_exact(8)
-        .map(|pair| [0, number(&pair[..4]), 1, number(&pair[4..])])
-        .collect()
 }
 
 #[test]

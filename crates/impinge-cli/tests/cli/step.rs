@@ -5,6 +5,7 @@ use std::path::Path;
 use impinge::{Backend, Detector, Impact, PairKind, Precision, Query, Scene};
 use impinge_scenes::Model;
 use impinge_scenes::surfaces::{ball, cube};
+use impinge_testing::npy::split;
 use serde_json::Value;
 
 use crate::harness::{Folder, keys, rod_and_plate};
@@ -64,13 +65,13 @@ fn csv(path: &Path) -> Vec<Row> {
     lines.map(row).collect()
 }
 
-/// A structured array: `kind` of two characters, four numbers, a time of `N` bytes.
-fn npy<const N: usize>(path: &Path, time: impl Fn([u8; N]) -> f64) -> Vec<Row> {
-    let bytes = std::fs::read(path).unwrap();
-    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    assert_eq!(start % 64, 0);
-    let header = std::str::from_utf8(&bytes[10..start]).unwrap();
-    assert!(header.contains(&format!("('toi', '<f{N}')")), "{header}");
+/// A row of a structured array: `kind` of two characters, four numbers, and more bytes.
+type Structured<const MORE: usize> = (String, [u32; 4], [u8; MORE]);
+
+/// The header and the rows of a structured array.
+fn npy<const MORE: usize>(bytes: &[u8]) -> (&str, Vec<Structured<MORE>>) {
+    let (header, data) = split(bytes);
+    assert_eq!((10 + header.len()) % 64, 0);
     let word = |at: &[u8]| u32::from_le_bytes(at[..4].try_into().unwrap());
     let row = |row: &[u8]| {
         let kind = [word(row), word(&row[4..])].map(|c| char::from_u32(c).unwrap());
@@ -78,15 +79,26 @@ fn npy<const N: usize>(path: &Path, time: impl Fn([u8; N]) -> f64) -> Vec<Row> {
         (
             kind.iter().collect(),
             numbers,
-            time(row[24..].try_into().unwrap()),
+            row[24..].try_into().unwrap(),
         )
     };
-    let rows: Vec<Row> = bytes[start..].chunks_exact(24 + N).map(row).collect();
+    let rows: Vec<_> = data.chunks_exact(24 + MORE).map(row).collect();
+    let shape = format!("'shape': ({},)", rows.len());
     assert!(
-        header.contains(&format!("'shape': ({},)", rows.len())),
+        header.contains(&shape) && header.ends_with('\n'),
         "{header}"
     );
-    rows
+    (header, rows)
+}
+
+/// Rows whose bytes after the numbers are a time.
+fn npy_impacts<const N: usize>(path: &Path, time: impl Fn([u8; N]) -> f64) -> Vec<Row> {
+    let bytes = std::fs::read(path).unwrap();
+    let (header, rows) = npy(&bytes);
+    assert!(header.contains(&format!("('toi', '<f{N}')")), "{header}");
+    let rows = rows.into_iter();
+    rows.map(|(kind, row, toi)| (kind, row, time(toi)))
+        .collect()
 }
 
 #[test]
@@ -173,10 +185,10 @@ fn impacts_read_back_to_the_same_bits() {
         }
         assert_eq!(csv(&folder.path("impacts.csv")), rows);
         let read = match toi {
-            Precision::F32 => npy(&folder.path("impacts.npy"), |bytes| {
+            Precision::F32 => npy_impacts(&folder.path("impacts.npy"), |bytes| {
                 f32::from_le_bytes(bytes).into()
             }),
-            Precision::F64 => npy(&folder.path("impacts.npy"), f64::from_le_bytes),
+            Precision::F64 => npy_impacts(&folder.path("impacts.npy"), f64::from_le_bytes),
         };
         assert_eq!(read, rows);
     }
@@ -304,25 +316,9 @@ fn candidates_are_written_in_every_format() {
 }
 
 fn npy_candidates(bytes: &[u8]) -> Vec<(String, [u32; 4])> {
-    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    assert_eq!(start % 64, 0);
-    let word = |at: &[u8]| u32::from_le_bytes(at[..4].try_into().unwrap());
-    let row = |row: &[u8]| {
-        let kind = [word(row), word(&row[4..])].map(|c| char::from_u32(c).unwrap());
-        (
-            kind.iter().collect(),
-            std::array::from_fn(|k| word(&row[8 + 4 * k..])),
-        )
-    };
-    let rows: Vec<_> = bytes[start..].chunks_exact(24).map(row).collect();
-    let header = std::str::from_utf8(&bytes[10..start]).unwrap();
-    let shape = format!("'shape': ({},)", rows.len());
-    assert!(
-        header.contains(&shape) && header.ends_with('\n'),
-        "{header}"
-    );
+    let (header, rows) = npy::<0>(bytes);
     assert!(!header.contains("toi") && header.contains("'element_b', '<u4')]"));
-    rows
+    rows.into_iter().map(|(kind, row, _)| (kind, row)).collect()
 }
 
 #[test]

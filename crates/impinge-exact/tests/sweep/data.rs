@@ -5,6 +5,7 @@
 use impinge_exact::{ElementPair, first_contact};
 use impinge_io::{Elements, Positions, ReadOptions};
 use impinge_testing::data::test_file;
+use impinge_testing::npy;
 
 type Point = [f64; 3];
 
@@ -132,27 +133,20 @@ impl Recorded {
 
     /// The rows of one kind, with their times.
     fn contacts(&self, kind: &str) -> Option<Vec<([u32; 2], f32, f64)>> {
-        let numbers = |what: &str| npy(&format!("ccd/{}/{kind}_{what}.npy", self.name));
-        let pairs = numbers("contacts")?;
-        let as_u32 = |bytes: &[u8]| u32::from_le_bytes(bytes.try_into().unwrap());
-        let pairs = pairs
-            .chunks_exact(8)
-            .map(|row| [as_u32(&row[..4]), as_u32(&row[4..])]);
-        let times_f32 = numbers("toi_f32")?;
-        let times_f64 = numbers("toi_f64")?;
-        let times = times_f32.chunks_exact(4).zip(times_f64.chunks_exact(8));
-        let rows: Vec<_> = pairs
-            .zip(times)
-            .map(|(row, (f32_bytes, f64_bytes))| {
-                (
-                    row,
-                    f32::from_le_bytes(f32_bytes.try_into().unwrap()),
-                    f64::from_le_bytes(f64_bytes.try_into().unwrap()),
-                )
-            })
-            .collect();
-        assert_eq!(rows.len() * 8, times_f64.len());
-        Some(rows)
+        let file = |what: &str| {
+            let path = test_file(&format!("ccd/{}/{kind}_{what}.npy", self.name))?;
+            Some(std::fs::read(path).unwrap())
+        };
+        let pairs = npy::rows(&file("contacts")?, "<u4", u32::from_le_bytes);
+        let times_f32 = npy::rows(&file("toi_f32")?, "<f4", f32::from_le_bytes);
+        let times_f64 = npy::rows(&file("toi_f64")?, "<f8", f64::from_le_bytes);
+        assert_eq!([times_f32.len(), times_f64.len()], [pairs.len(); 2]);
+        let times = times_f32.into_iter().zip(times_f64);
+        let rows = pairs.into_iter().zip(times);
+        Some(
+            rows.map(|(row, ([narrow], [wide]))| (row, narrow, wide))
+                .collect(),
+        )
     }
 
     fn check(&self, kind: &str, pair: ElementPair, n_expected: usize) {
@@ -202,14 +196,6 @@ impl Recorded {
             assert_eq!(found, answer.as_bool().unwrap(), "{kind} {row:?}");
         }
     }
-}
-
-/// The data of a NumPy file.
-fn npy(path: &str) -> Option<Vec<u8>> {
-    let bytes = std::fs::read(test_file(path)?).unwrap();
-    assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00", "NumPy format 1.0");
-    let header_end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    Some(bytes[header_end..].to_vec())
 }
 
 #[test]

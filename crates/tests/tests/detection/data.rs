@@ -3,14 +3,13 @@
 //! (`../shared/data` or `$IMPINGE_DATA`) these tests fail, unless `IMPINGE_NO_DATA=1` is set.
 
 use std::collections::HashSet;
-use std::path::PathBuf;
 
 use impinge_core::{
     Backend, BodyId, Detector, Filter, Method, Query, Scene, Settings, SharedVertex, hash_rows,
 };
 use impinge_io::{Mesh, ReadOptions, Sequence};
 use impinge_testing::data::test_file;
-use impinge_testing::published::{self, Published};
+use impinge_testing::published::{self, Published, rows_of_two_bodies};
 use impinge_tests::{Case, agree, naive, rows};
 
 /// One detector per method and backend. Without a GPU adapter this fails.
@@ -55,28 +54,6 @@ fn add(scene: &mut Scene, mesh: &Mesh) -> BodyId {
     .unwrap()
 }
 
-/// The 32-bit or 64-bit integers of an `(n, 2)` array in NumPy's format.
-fn read_npy_pairs(path: &PathBuf) -> Vec<[u32; 4]> {
-    let bytes = std::fs::read(path).unwrap();
-    let header_len = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let header = std::str::from_utf8(&bytes[10..10 + header_len]).unwrap();
-    let data = &bytes[10 + header_len..];
-    let numbers: Vec<u32> = if header.contains("i8") || header.contains("u8") {
-        data.chunks_exact(8)
-            .map(|word| u64::from_le_bytes(word.try_into().unwrap()) as u32)
-            .collect()
-    } else {
-        assert!(header.contains("i4") || header.contains("u4"), "{header}");
-        data.chunks_exact(4)
-            .map(|word| u32::from_le_bytes(word.try_into().unwrap()))
-            .collect()
-    };
-    numbers
-        .chunks_exact(2)
-        .map(|pair| [0, pair[0], 1, pair[1]])
-        .collect()
-}
-
 #[test]
 fn two_bodies_meet_as_the_exact_kernel_says() {
     let Some(answers) = test_file("expected/two_body.json") else {
@@ -97,7 +74,7 @@ fn two_bodies_meet_as_the_exact_kernel_says() {
         let Some(list) = test_file(answer["file"].as_str().unwrap()) else {
             return;
         };
-        let expected = read_npy_pairs(&list);
+        let expected = rows_of_two_bodies(&list);
         assert_eq!(expected.len() as u64, answer["pairs"].as_u64().unwrap());
         let moved: Vec<[f32; 3]> = positions_f32(&mesh.positions)
             .iter()

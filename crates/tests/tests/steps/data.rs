@@ -8,20 +8,7 @@ use impinge_core::{
     Backend, Detector, Impact, InstructionSet, PairKind, Precision, Query, Scene, Settings, Start,
 };
 use impinge_testing::data::test_file;
-
-/// The numbers of an array in NumPy's format, little-endian and in C order.
-fn npy<T, const N: usize>(path: &str, kind: &str, read: impl Fn([u8; N]) -> T) -> Vec<T> {
-    let bytes = std::fs::read(test_file(path).expect("beside the frames")).expect("readable");
-    let header_end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let header = std::str::from_utf8(&bytes[10..header_end]).expect("ASCII");
-    assert!(
-        header.contains(kind) && header.contains("'fortran_order': False"),
-        "{header}"
-    );
-    let (numbers, rest) = bytes[header_end..].as_chunks::<N>();
-    assert!(rest.is_empty());
-    numbers.iter().map(|&bytes| read(bytes)).collect()
-}
+use impinge_testing::npy;
 
 struct Scenario {
     name: &'static str,
@@ -73,16 +60,17 @@ impl Scenario {
 
     /// Pairs and times of one kind.
     fn expected(&self, kind: PairKind, toi: Precision) -> Vec<(u32, u32, f64)> {
-        let path = |what: &str| format!("ccd/{}/{}_{what}.npy", self.name, kind.name());
-        let numbers = npy(&path("contacts"), "<u4", u32::from_le_bytes);
-        let times: Vec<f64> = match toi {
-            Precision::F32 => npy(&path("toi_f32"), "<f4", |b| {
-                f64::from(f32::from_le_bytes(b))
-            }),
-            Precision::F64 => npy(&path("toi_f64"), "<f8", f64::from_le_bytes),
+        let file = |what: &str| {
+            let path = format!("ccd/{}/{}_{what}.npy", self.name, kind.name());
+            std::fs::read(test_file(&path).expect("beside the frames")).expect("readable")
         };
-        let pairs = numbers.chunks_exact(2).zip(times);
-        pairs.map(|(pair, time)| (pair[0], pair[1], time)).collect()
+        let pairs = npy::rows(&file("contacts"), "<u4", u32::from_le_bytes);
+        let times = match toi {
+            Precision::F32 => npy::rows(&file("toi_f32"), "<f4", |b| f32::from_le_bytes(b).into()),
+            Precision::F64 => npy::rows(&file("toi_f64"), "<f8", f64::from_le_bytes),
+        };
+        let rows = pairs.into_iter().zip(times);
+        rows.map(|([a, b], [time])| (a, b, time)).collect()
     }
 }
 
