@@ -114,8 +114,7 @@ impl Folder {
         std::fs::write(self.path(name), text).unwrap();
     }
 
-    /// Writes triangles as a binary PLY file with exactly these f32 coordinates.
-    /// The same, with a time that does not tell that it was written now.
+    /// Writes a text with a time that does not tell that it was written now.
     pub fn old_text(&self, name: &str, text: &str) {
         self.text(name, text);
         let mut options = File::options();
@@ -123,6 +122,7 @@ impl Folder {
         file.unwrap().set_modified(UNIX_EPOCH).unwrap();
     }
 
+    /// Writes triangles as a binary PLY file with exactly these f32 coordinates.
     pub fn ply(&self, name: &str, model: &Model) {
         let Elements::Triangles(faces) = &model.elements else {
             panic!("PLY is for triangles");

@@ -6,14 +6,15 @@ use std::io::Write;
 use std::path::Path;
 
 use impinge_check::{Checked, Problem, Row};
-use impinge_io::{ColoredMesh, Elements, write_glb, write_ply, write_vtu};
+use impinge_io::{ColoredMesh, Elements};
 
 use impinge_render::{Face, Normals, Surface};
 
 use super::args::CheckArgs;
 use crate::error::Error;
+use crate::meshes::write_colored;
 use crate::output::out;
-use crate::values::{MeshFile, MeshFormat};
+use crate::values::MeshFile;
 
 /// The colour of elements without a finding.
 const FINE: [u8; 3] = [200, 200, 200];
@@ -70,12 +71,7 @@ pub fn write_mesh(file: &MeshFile, rows: &[Row]) -> Result<(), Error> {
             name,
         })
         .collect();
-    match file.format {
-        MeshFormat::Ply => write_ply(&file.path, &meshes)?,
-        MeshFormat::Glb => write_glb(&file.path, &meshes)?,
-        MeshFormat::Vtu => write_vtu(&file.path, &meshes)?,
-    }
-    Ok(())
+    write_colored(file, &meshes)
 }
 
 /// Prints the meaning of the colours.
