@@ -62,7 +62,8 @@ impl Detector {
     /// let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     /// let mut scene = Scene::new();
     /// let a = scene.add_triangles(&tetrahedron, &corners)?;
-    /// let b = scene.add_triangles(&tetrahedron, &corners.map(|[x, y, z]| [x + 0.1, y + 0.125, z - 0.875]))?;
+    /// let moved = corners.map(|[x, y, z]| [x + 0.1, y + 0.125, z - 0.875]);
+    /// let b = scene.add_triangles(&tetrahedron, &moved)?;
     /// let mut detector = Detector::new(Backend::Cpu)?;
     /// let pairs = detector.detect(&scene, &Query::between(a, b))?.clone();
     /// let contacts = detector.contacts(&scene, &pairs)?;
@@ -77,10 +78,10 @@ impl Detector {
     /// # Errors
     /// A body that is not in the scene, the same body twice, a body not made of triangles, a
     /// surface that is not closed, contacts without these two though they intersect; contacts of a
-    /// query that left out pairs of the two: in a cell, by groups, by lists of vertices, by pairs of
-    /// an answer, or because faces of both were [pinned](Scene::set_pinned); contacts of pairs some
-    /// of which [`retain`](Pairs::retain) dropped; a body that was moved or re-meshed since the pairs
-    /// were found ([`Error::Moved`]).
+    /// query that left out pairs of the two: in a cell, by groups, by lists of vertices, by pairs
+    /// of an answer, or because faces of both were [pinned](Scene::set_pinned); contacts of pairs
+    /// some of which [`retain`](Pairs::retain) dropped; a body that was moved or re-meshed since
+    /// the pairs were found ([`Error::Moved`]).
     pub fn penetration(
         &mut self,
         scene: &Scene,

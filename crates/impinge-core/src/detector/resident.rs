@@ -103,11 +103,11 @@ impl Gpu<'_> {
     /// larger than their capacities, see [`ResidentPairs`]; [`grow`](Gpu::grow) then makes room.
     ///
     /// # Errors
-    /// Those of [`detect`](Detector::detect) about the query; a body with two buffers, a buffer that
-    /// is too small or lacks its usage; a query for [one cell](Query::owned_by); a detector without
-    /// a device of the caller's, a lost one; a frame larger than the device or the memory budget
-    /// can hold. Device errors go to the device's owner, and so do those of kernels, which the
-    /// first frame compiles.
+    /// Those of [`detect`](Detector::detect) about the query; a body with two buffers, a buffer
+    /// that is too small or lacks its usage; a query for [one cell](Query::owned_by); a detector
+    /// without a device of the caller's, a lost one; a frame larger than the device or the memory
+    /// budget can hold. Device errors go to the device's owner, and so do those of kernels, which
+    /// the first frame compiles.
     pub fn encode(
         &mut self,
         scene: &Scene,
@@ -242,11 +242,11 @@ impl Gpu<'_> {
     /// directions too, and leaves alone what goes apart.
     ///
     /// `starts` has the positions of which `safe` was found, as they were given to
-    /// [`encode_safe_distances`](Gpu::encode_safe_distances), or a copy. `ends` has the wished ones,
-    /// and then those that are reached: no vertex is farther from its start than it may move,
-    /// proven under any rounding that WGSL allows. So nothing touches on the way that was looked at,
-    /// if all bodies that move are given, bodies that are not fixed move no other way, and others
-    /// do not move. A wished position may be any number, infinite too.
+    /// [`encode_safe_distances`](Gpu::encode_safe_distances), or a copy. `ends` has the wished
+    /// ones, and then those that are reached: no vertex is farther from its start than it may move,
+    /// proven under any rounding that WGSL allows. So nothing touches on the way that was looked
+    /// at, if all bodies that move are given, bodies that are not fixed move no other way, and
+    /// others do not move. A wished position may be any number, infinite too.
     ///
     /// `safe` must come from the last call of `encode_safe_distances` of this detector, because the
     /// next one writes into the same buffer, and `scene` is the scene that it was asked for: if a
@@ -260,10 +260,10 @@ impl Gpu<'_> {
     ///
     /// # Errors
     /// Safe distances that are not the last ones of this detector, or of a body that is no longer
-    /// the same; a body without safe distances, with `ends` alone or with two buffers, a buffer that
-    /// is too small, lacks a usage, is larger than a binding may be, or is that of both ends; end
-    /// positions of a body with vertices in a buffer that is given for another, too; a lost device,
-    /// a detector without one of the caller's.
+    /// the same; a body without safe distances, with `ends` alone or with two buffers, a buffer
+    /// that is too small, lacks a usage, is larger than a binding may be, or is that of both ends;
+    /// end positions of a body with vertices in a buffer that is given for another, too; a lost
+    /// device, a detector without one of the caller's.
     pub fn encode_truncate(
         &mut self,
         scene: &Scene,

@@ -76,8 +76,8 @@ impl PairSet {
         self.0.body
     }
 
-    /// Refuses a body whose elements have other numbers now, if they take part. Pairs of a body that
-    /// is no longer there are none.
+    /// Refuses a body whose elements have other numbers now, if they take part. Pairs of a body
+    /// that is no longer there are none.
     ///
     /// # Errors
     /// Names the body.
@@ -166,8 +166,8 @@ struct PartsOfElements([Option<NumberedElements>; PARTS.len()]);
 #[derive(Debug)]
 struct NumberedElements {
     first: Number,
-    /// The sorted corners of each, and which it is; sorted. `None` if they are numbered as positions
-    /// are, or as the elements that the body was given as.
+    /// The sorted corners of each, and which it is; sorted. `None` if they are numbered as
+    /// positions are, or as the elements that the body was given as.
     by_corners: Option<Vec<(Corners, u32)>>,
 }
 

@@ -101,8 +101,8 @@ impl Exclusion {
     /// Pairs of an element of body `a` and one of body `b` of which some vertices are listed
     /// together, as compressed sparse rows: the list of vertex `v` of `a` is
     /// `vertices[offsets[v]..offsets[v + 1]]`, vertices of `b`. With `a == b` these are pairs of
-    /// that body, in either order. Lists need not be sorted. Whether they fit both bodies, and these
-    /// the scene, is checked when something is asked.
+    /// that body, in either order. Lists need not be sorted. Whether they fit both bodies, and
+    /// these the scene, is checked when something is asked.
     ///
     /// For what only the caller knows: vertices that are sewn or glued together, or that a solver
     /// handles in another way.
@@ -373,7 +373,8 @@ impl Query {
     ///
     /// ```
     /// use impinge::Query;
-    /// let left = Query::all().owned_by([f64::NEG_INFINITY; 3], [0.0, f64::INFINITY, f64::INFINITY]);
+    /// let high = [0.0, f64::INFINITY, f64::INFINITY];
+    /// let left = Query::all().owned_by([f64::NEG_INFINITY; 3], high);
     /// ```
     pub fn owned_by(mut self, low: [f64; 3], high: [f64; 3]) -> Self {
         self.cell = Some(Cell { low, high });
@@ -529,8 +530,8 @@ impl Query {
         }
     }
 
-    /// Bodies of the scenes that exclusions are about: those that are named, and one for each set of
-    /// pairs.
+    /// Bodies of the scenes that exclusions are about: those that are named, and one for each set
+    /// of pairs.
     pub(crate) fn excluded_bodies(&self) -> impl Iterator<Item = BodyId> + '_ {
         let named = self.excluded.iter().flat_map(|&(a, b)| [a, b]);
         let listed = self.vertices.iter().flat_map(VertexLists::bodies);

@@ -4,27 +4,11 @@
 use std::collections::{BTreeSet, VecDeque};
 
 use impinge_core::{
-    Backend, BodyId, Detector, Element, Elements, Error, Exclusion, Method, PairKind, Part, Query,
-    Scene, Settings, Start,
+    Backend, BodyId, Detector, Element, Elements, Error, Exclusion, PairKind, Part, Query, Scene,
+    Settings, Start,
 };
 use impinge_scenes::{Random, solids, surfaces};
-
-fn detectors() -> [Detector; 3] {
-    [
-        (Method::Clusters, 1),
-        (Method::Clusters, 4),
-        (Method::Naive, 1),
-    ]
-    .map(|(method, threads)| {
-        Detector::new(
-            Settings::new()
-                .method(method)
-                .threads(threads)
-                .backend(Backend::Cpu),
-        )
-        .expect("settings")
-    })
-}
+use impinge_tests::detectors;
 
 /// Crumpled cloth, and a body that it falls on; random end positions.
 fn scene(seed: u64) -> (Scene, [BodyId; 2]) {
@@ -584,11 +568,11 @@ fn elements_of_all_kinds_that_were_near_are_left_out() {
     rest.set_edges(cloth, &own).expect("good");
     let mut moved = at_end(&rest);
     moved
-        .set_positions(lines, &some(&mut random, 80))
+        .set_positions(lines, some(&mut random, 80))
         .expect("good");
     let n = moved.body(block).expect("held").n_vertices();
     moved
-        .set_positions(block, &some(&mut random, n))
+        .set_positions(block, some(&mut random, n))
         .expect("good");
     check_elements_at_rest(&rest, &moved);
     // The answer names a body that one clone no longer has.
