@@ -336,7 +336,7 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     setPinned(which, pinned) {
-      const flags = list("pinned", pinned).map((of) => (/^(boolean|number)$/.test(typeof of) ? Number(Boolean(of)) : refuse(`pinned: ${shown(of)} given, true or false is needed`)));
+      const flags = list("pinned", pinned).map((of) => ([true, false, 1, 0].includes(of) ? Number(of) : refuse(`pinned: ${shown(of)} given, true or false is needed`)));
       call(() => this.#held.set_pinned(body(which), Uint8Array.from(flags)));
       this.#moves.mark(which);
     }

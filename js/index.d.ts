@@ -208,6 +208,10 @@ export declare class Scene {
   /** Adds a body. A mesh that was read can be given as it is. */
   add(mesh: Mesh): Body;
   addTriangles(faces: Index, positions: GivenPositions): Body;
+  /**
+   * Whether elements intersect is asked of tetrahedra themselves; distances, steps, points and rays are about their surface, the faces that are
+   * not between two of them. It does not bound a body where a tetrahedron is turned inside out, so nothing stops at such a face.
+   */
   addTetrahedra(tetrahedra: Index, positions: GivenPositions): Body;
   /** Edges such as strands of hair. */
   addEdges(edges: Index, positions: GivenPositions): Body;
@@ -254,7 +258,7 @@ export declare class Scene {
   /** Puts each vertex of a body into a group, for `exclude: [{ groups: [g, h] }]`. A body whose groups were never set is in none. */
   setGroups(body: Body, groups: Index): void;
   /**
-   * Which vertices of a body never move, 1 or true. Pairs of elements all of whose vertices are pinned are left out of every question, but for
+   * Which vertices of a body never move, one of 0, 1, false, true for each. Pairs of elements all of whose vertices are pinned are left out of every question, but for
    * `distance` and `nearest`, which look at all elements. `remesh` forgets it.
    */
   setPinned(body: Body, pinned: ArrayLike<number | boolean>): void;

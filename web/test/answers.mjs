@@ -189,6 +189,7 @@ export async function refusals(module) {
   said.matrix4 = await refusal(() => scene.setTransform(a, { elements: Array(16).fill(0) }));
   said.filter = await refusal(() => scene.setFilter(a, 2n ** 64n));
   said.pinned = await refusal(() => scene.setPinned(a, ["no", "no", "no"]));
+  said.pinnedNumbers = await refusal(() => scene.setPinned(a, [2, 1, 0]));
   said.nothing = await refusal(() => scene.add());
   said.forgotten = await refusal(() => scene.add({ faces: undefined, positions: triangle }));
   said.welded = await refusal(() => weld({ faces: undefined, positions: triangle }));
@@ -360,6 +361,7 @@ export const REFUSALS = {
   matrix4: "invalid: transform: an Object given, 16 numbers allowed, column by column, as elements of a Matrix4",
   filter: "invalid: category: 18446744073709551616n given, a whole number of 64 bits is needed",
   pinned: 'invalid: pinned: "no" given, true or false is needed',
+  pinnedNumbers: "invalid: pinned: 2 given, true or false is needed",
   nothing: "invalid: mesh: undefined given, an object with positions is needed",
   forgotten: "invalid: faces: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no faces",
   welded: "invalid: faces: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no faces",

@@ -15,7 +15,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
-use impinge::{Backend, Method, Query, Scene, SharedVertex};
+use impinge::{Backend, Detector, Method, Query, Scene, SharedVertex};
 
 use crate::commands::{
     CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FIX_EXAMPLES, FixArgs, TILES_EXAMPLES, TilesArgs,
@@ -340,20 +340,26 @@ pub struct ExcludeArgs {
 /// Pairs that are left out because they are near at rest.
 #[derive(Debug, Clone, Default, Args)]
 pub struct RestArgs {
-    /// Leave out pairs that are at most R apart, a length, before anything moves. Of elements that
-    /// intersect those whose corners, edges or faces are such a pair. Nothing is proven of them:
-    /// they may pass through each other
+    /// Leave out pairs that are at most R apart, a length, besides their thickness, before anything
+    /// moves: at the start of a step, in the mesh of a sequence. Nothing is proven of them: they may
+    /// pass through each other
     #[arg(id = "exclude_rest", long = "exclude-rest", value_name = "R", value_parser = distance, allow_negative_numbers = true)]
     pub distance: Option<f64>,
 }
 
 impl RestArgs {
-    /// The query without the pairs that are near in a scene.
-    pub fn leave_out(&self, query: Query, scene: &Scene) -> Result<Query, Error> {
-        Ok(match self.distance {
-            Some(distance) => query.exclude(scene.rest_pairs(distance)?),
-            None => query,
-        })
+    /// The query without the pairs of its kinds that are near in a scene.
+    pub fn leave_out(
+        &self,
+        query: Query,
+        detector: &mut Detector,
+        scene: &Scene,
+    ) -> Result<Query, Error> {
+        let Some(distance) = self.distance else {
+            return Ok(query);
+        };
+        let near = detector.near(scene, distance, &query)?;
+        Ok(query.exclude(&near))
     }
 }
 

@@ -107,7 +107,13 @@ impl Asked {
             ));
         }
         if let Some(distance) = self.rest {
-            not_asked.push(format!("what is at most {distance} apart at rest"));
+            let is_thick = thickness.of_bodies.iter().any(|(_, of)| *of > 0.0);
+            let thick = if is_thick {
+                ", plus its thickness,"
+            } else {
+                ""
+            };
+            not_asked.push(format!("what is at most {distance}{thick} apart at rest"));
         }
         if self.has_kinds {
             not_asked.push("other kinds of pairs (--kinds)".to_owned());

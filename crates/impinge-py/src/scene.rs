@@ -547,12 +547,12 @@ impl Scene {
         a: &Bound<'_, PyAny>,
         b: &Bound<'_, PyAny>,
     ) -> PyResult<Option<Overlap>> {
-        let checked = |body| -> PyResult<&impinge::Body> {
-            let id = self.id(body, "body")?;
+        let checked = |body, name| -> PyResult<&impinge::Body> {
+            let id = self.id(body, name)?;
             self.inner.check_positions(id).map_err(raise)?;
             self.inner.body(id).map_err(raise)
         };
-        let bodies = [checked(a)?, checked(b)?];
+        let bodies = [checked(a, "a")?, checked(b, "b")?];
         Ok(py.detach(|| {
             let [a, b] = bodies.map(|body| -> Vec<[f64; 3]> {
                 let vertices = 0..body.n_vertices();

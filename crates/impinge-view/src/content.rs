@@ -14,7 +14,7 @@ pub struct Shown {
     pub name: String,
     /// Its colours.
     pub colors: Colors,
-    /// The number of each of its vertices for the user, such as that in the file of a mesh that was
+    /// One number per vertex, for the user, such as that in the file of a mesh that was
     /// welded; `None` if it is that in the scene.
     pub vertices: Option<Arc<[u32]>>,
 }

@@ -275,10 +275,11 @@ template <class T, std::size_t N> struct as_array<T[N]> {
   static array of(const T (&given)[N], std::size_t columns) { return detail::packed_rows<std::remove_cv_t<T>>(given, N, columns); }
 };
 
-/// Rows that the library gives, as their type, which is numbers or `std::array`: `as_rows<std::array<float, 3>>(scene.positions(body))`. Without a
+/// Rows that the library gives, as their type, which is numbers, `std::array`, or a vector of Eigen that needs no alignment: `as_rows<std::array<float, 3>>(scene.positions(body))`. Without a
 /// copy. Other numbers, other columns and rows that are not packed are refused.
 template <class Row> result<view<Row>> as_rows(const array &of) {
   using number = typename detail::row_of<Row>::number;
+  static_assert(alignof(Row) <= alignof(number), "rows of the library are aligned as their numbers are: use std::array, or Eigen::DontAlign");
   constexpr auto n = sizeof(Row) / sizeof(number), type = static_cast<std::size_t>(detail::type_of<number>());
   const bool is_packed = of.row_stride == static_cast<std::ptrdiff_t>(sizeof(Row)) && (n == 1 || of.column_stride == static_cast<std::ptrdiff_t>(sizeof(number)));
   if (of.rows > 0 && (of.type != type || !is_packed)) {

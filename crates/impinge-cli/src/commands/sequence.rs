@@ -63,7 +63,10 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     } = bodies;
     thicken(&mut scene, &ids, &args.step.thickness)?;
     let query = query(asked, &args.ask.exclude, &ids)?;
-    let query = args.rest.leave_out(query, &scene)?;
+    let query = match args.ccd {
+        true => args.step.of(query),
+        false => query,
+    };
     let bodies: Vec<(BodyId, &str)> = ids
         .into_iter()
         .zip(names.iter().map(String::as_str))
@@ -83,6 +86,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     })?;
     let mut detector = detector(&args.detector)?;
     detector.set_control(Control::new().cancel(cancel));
+    let query = args.rest.leave_out(query, &mut detector, &scene)?;
     let inputs = Inputs::new(
         std::iter::once(&args.mesh)
             .chain(&args.others)
@@ -107,7 +111,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         };
         let steps = steps_of_sequence(
             (&mut detector, &mut scene, moving, &origins),
-            &args.step.of(query),
+            &query,
             &mut frames,
             range,
             shown,

@@ -43,11 +43,11 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     let mut bodies = Moving::read(args, cancel)?;
     thicken(&mut bodies.scene, &bodies.ids, &args.how.thickness)?;
     let asked = asked(args, &bodies)?;
-    let query = query(asked, &args.exclude, &bodies.ids)?;
-    let step = args.how.of(args.rest.leave_out(query, &bodies.scene)?);
+    let step = args.how.of(query(asked, &args.exclude, &bodies.ids)?);
 
     let watch = Watch::detection(!args.detector.no_progress, "detecting");
     detector.set_control(watch.control(cancel));
+    let step = args.rest.leave_out(step, &mut detector, &bodies.scene)?;
     if let Some(file) = &candidates {
         let of_boxes = (args.inflation, &step);
         let written = candidates::write(file, (&mut detector, &bodies), of_boxes)?;

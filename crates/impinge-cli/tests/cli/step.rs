@@ -769,6 +769,38 @@ fn what_is_near_at_rest_is_left_out() {
     let text = check(&["--exclude-rest", "0.125"]).printed();
     let said = "not asked: self-collision, what is at most 0.125 apart at rest";
     assert!(text.starts_with("free: ") && text.contains(said), "{text}");
+    // The start is asked about without them, too, and thickness adds to the distance.
+    let crossing = [
+        "step",
+        "floor.obj",
+        "floor.obj",
+        "f1.obj",
+        "far.obj",
+        "--no-self",
+    ];
+    let start = |more: &[&str]| folder.run(crossing.iter().chain(more)).code;
+    assert_eq!(
+        [start(&[]), start(&["--exclude-rest", "0"])],
+        [Some(4), Some(0)]
+    );
+    let thick = ["--exclude-rest", "0.0625", "--thickness", "1,0.0625"];
+    let text = check(&thick).printed();
+    let said = "what is at most 0.0625, plus its thickness, apart at rest";
+    assert!(text.starts_with("free: ") && text.contains(said), "{text}");
+    // Of the kinds that are asked about.
+    for (kinds, n_left) in [("vf", 0), ("vv", 0)] {
+        let args = [
+            "--kinds",
+            kinds,
+            "--separation",
+            "0.125",
+            "--exclude-rest",
+            "0.125",
+            "--json",
+        ];
+        let answer = folder.run(moved.iter().chain(&args)).json();
+        assert_eq!(answer["impacts"], n_left, "{answer}");
+    }
     // In a sequence, at rest is the mesh, whatever its first frame is.
     let sequence = ["sequence", "rest.obj", "f%d.obj", "--other", "floor.obj"];
     let pairs = |more: &[&str]| {

@@ -230,7 +230,6 @@ impl Detector {
         let at_start = Query {
             kinds: None,
             filter: None,
-            pairs: Vec::new(),
             ..query.clone().shared_vertex(SharedVertex::Resolve)
         };
         let intersects = match &query.filter {

@@ -29,7 +29,7 @@ pub(crate) struct LeftOut {
     groups: BTreeSet<(u32, u32)>,
     vertices: Vec<VertexList>,
     pairs: Vec<SortedKeys>,
-    /// The same, of the question which elements intersect, which has no such pairs itself.
+    /// Used in place of `pairs` when the question is which elements intersect.
     of_elements: Vec<Arc<PairsOfElements>>,
 }
 

@@ -1,11 +1,12 @@
 //! Pairs of vertices, edges and faces that a query leaves out by name.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::query::pair_kind::PairKind;
 use crate::scene::Scene;
 use crate::scene::bodies::NumberedPart;
+use crate::scene::body::Body;
 use crate::scene::elements::Part;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -35,7 +36,7 @@ struct HeldPairs {
     bodies: BTreeSet<[BodyId; 2]>,
     /// Their keys in the numbers of the last plan.
     keys: Mutex<Option<(Vec<Numbered>, SortedKeys)>>,
-    /// Those of the bodies that the last scene had.
+    /// Their lookup by elements, for the scene that was asked about last.
     of_elements: Mutex<Option<Arc<PairsOfElements>>>,
 }
 
@@ -52,9 +53,13 @@ impl PairSet {
     ) -> Self {
         let mut of_kinds: [Vec<Named>; PairKind::ALL.len()] = Default::default();
         let (mut named, mut bodies) = (BTreeSet::new(), BTreeSet::new());
+        let mut last = None;
         for (kind, pair) in pairs {
             of_kinds[kind as usize].push(pair);
             let [a, b] = pair.map(|(body, _)| body);
+            if last.replace((kind, a, b)) == Some((kind, a, b)) {
+                continue;
+            }
             bodies.insert([a.min(b), a.max(b)]);
             named.extend(pair.map(|(body, _)| body).into_iter().zip(kind.parts()));
         }
@@ -147,11 +152,12 @@ impl HeldPairs {
     }
 }
 
-/// Pairs, to be looked up by two elements that bodies were given as: each of them is one of a pair,
-/// or has it as a corner, an edge or a face.
+/// Looks up whether two elements that bodies were given as contain a pair: each is one of its
+/// elements, or has it as a corner, an edge or a face.
 #[derive(Debug)]
 pub(crate) struct PairsOfElements {
-    of_bodies: BTreeMap<BodyId, PartsOfElements>,
+    /// Sorted by body.
+    of_bodies: Vec<(BodyId, PartsOfElements)>,
     bodies: BTreeSet<[BodyId; 2]>,
     keys: [Vec<u64>; PairKind::ALL.len()],
 }
@@ -159,7 +165,8 @@ pub(crate) struct PairsOfElements {
 /// What elements consist of, by dimension.
 const PARTS: [Part; 3] = [Part::Vertices, Part::Edges, Part::Faces];
 
-/// How the elements of a body tell what they consist of: by dimension, where pairs name such parts.
+/// The numbers of the corners, edges and faces of a body's elements, by dimension; none where no
+/// pair names such parts.
 #[derive(Debug, Default)]
 struct PartsOfElements([Option<NumberedElements>; PARTS.len()]);
 
@@ -210,14 +217,29 @@ impl PartsOfElements {
     }
 }
 
+fn dimension_of(part: Part) -> Option<usize> {
+    PARTS.iter().position(|&of| of == part)
+}
+
+/// The body that a part is of, if its elements still have the numbers that pairs name. One that does
+/// not take part in a question may be gone, or have others.
+fn fitting<'a>(scene: &'a Scene, &(id, part, stamp): &NumberedPart) -> Option<&'a Body> {
+    let body = scene.body(id).ok()?;
+    (body.numbers_stamp(part) == stamp).then_some(body)
+}
+
+/// Where a body is in a sorted list, or where it would be.
+fn place<T>(list: &[(BodyId, T)], body: BodyId) -> Result<usize, usize> {
+    list.binary_search_by_key(&body, |&(id, _)| id)
+}
+
 impl PairsOfElements {
     fn new(pairs: &HeldPairs, scene: &Scene) -> Self {
-        let mut of_bodies: BTreeMap<BodyId, PartsOfElements> = BTreeMap::new();
+        let mut of_bodies: Vec<(BodyId, PartsOfElements)> = Vec::new();
         let mut n = 0;
-        for &(id, part, _) in &pairs.parts {
-            let (Ok(body), Some(dimension)) =
-                (scene.body(id), PARTS.iter().position(|&of| of == part))
-            else {
+        for named in &pairs.parts {
+            let &(id, part, _) = named;
+            let (Some(body), Some(dimension)) = (fitting(scene, named), dimension_of(part)) else {
                 continue;
             };
             let elements = body.part(part);
@@ -229,7 +251,11 @@ impl PairsOfElements {
                 all.sort_unstable();
                 all
             });
-            of_bodies.entry(id).or_default().0[dimension] = Some(NumberedElements {
+            let ix = place(&of_bodies, id).unwrap_or_else(|ix| {
+                of_bodies.insert(ix, (id, PartsOfElements::default()));
+                ix
+            });
+            of_bodies[ix].1.0[dimension] = Some(NumberedElements {
                 first: Number::new(n),
                 by_corners,
             });
@@ -240,9 +266,9 @@ impl PairsOfElements {
             };
         }
         let keys = pairs.keys_in(|body, part| {
-            let dimension = PARTS.iter().position(|&of| of == part)?;
-            let numbered = of_bodies.get(&body)?.0[dimension].as_ref()?;
-            Some(numbered.first)
+            let dimension = dimension_of(part)?;
+            let (_, of) = &of_bodies[place(&of_bodies, body).ok()?];
+            Some(of.0[dimension].as_ref()?.first)
         });
         PairsOfElements {
             of_bodies,
@@ -251,11 +277,19 @@ impl PairsOfElements {
         }
     }
 
-    /// Whether the scene has the bodies of which these are, and no others that pairs name. Their
-    /// elements have not changed, see [`check`](PairSet::check).
+    /// Whether these are of all parts that pairs name and that are in the scene as they were.
     fn is_of(&self, scene: &Scene, pairs: &HeldPairs) -> bool {
-        let mut named = pairs.parts.iter();
-        named.all(|&(id, ..)| scene.body(id).is_ok() == self.of_bodies.contains_key(&id))
+        pairs.parts.iter().all(|named| {
+            let &(id, part, _) = named;
+            let of = self.of(id).zip(dimension_of(part));
+            let is_held = of.is_some_and(|(of, dimension)| of.0[dimension].is_some());
+            fitting(scene, named).is_some() == is_held
+        })
+    }
+
+    fn of(&self, body: BodyId) -> Option<&PartsOfElements> {
+        let ix = place(&self.of_bodies, body).ok()?;
+        Some(&self.of_bodies[ix].1)
     }
 
     /// Whether there are pairs of two bodies.
@@ -265,7 +299,7 @@ impl PairsOfElements {
 
     /// Whether two elements, each with its corners, have a pair.
     pub fn has(&self, bodies: [BodyId; 2], [a, b]: [(ElementIx, &[u32]); 2]) -> bool {
-        let [Some(of_a), Some(of_b)] = bodies.map(|body| self.of_bodies.get(&body)) else {
+        let [Some(of_a), Some(of_b)] = bodies.map(|body| self.of(body)) else {
             return false;
         };
         let has = |(part_a, a), (part_b, b)| {
@@ -274,6 +308,14 @@ impl PairsOfElements {
                 keys.binary_search(&pair_key(a, b)).is_ok()
             })
         };
-        self.are_of(bodies) && of_a.of(a).any(|a| of_b.of(b).any(|b| has(a, b)))
+        if !self.are_of(bodies) {
+            return false;
+        }
+        // A tetrahedron has the most parts.
+        let mut held = [None; 14];
+        for (held, part) in held.iter_mut().zip(of_b.of(b)) {
+            *held = Some(part);
+        }
+        (of_a.of(a)).any(|a| held.iter().map_while(|&b| b).any(|b| has(a, b)))
     }
 }

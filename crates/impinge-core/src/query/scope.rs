@@ -297,12 +297,12 @@ impl Query {
     /// [`nearest`](crate::Detector::nearest).
     ///
     /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and
-    /// [`any`](crate::Detector::any) find all pairs first and leave out what is left out then:
-    /// limits count it, too. They are about the elements that bodies were given as. Of these, pairs
-    /// of an answer leave out those that have such a pair among themselves, their corners, edges
-    /// and faces: those that were within its distance, if it was asked about all kinds that matter.
-    /// Frames that stay on a device refuse pairs of an answer, and
-    /// [`nearest`](crate::Detector::nearest) refuses all but bodies.
+    /// [`any`](crate::Detector::any) find all pairs, then drop those that are left out, one after
+    /// the other; limits count the dropped pairs, too. They are about the elements that bodies were
+    /// given as. Pairs of an answer leave out two of these if a corner, an edge or a face of one is
+    /// in a pair with one of the other: faces without a common vertex that were within its
+    /// distance, and of tetrahedra only those at the surface. Frames that stay on a device refuse
+    /// pairs of an answer, and [`nearest`](crate::Detector::nearest) refuses all but bodies.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Exclusion, Query, Scene};

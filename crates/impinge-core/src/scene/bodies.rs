@@ -59,6 +59,13 @@ impl Scene {
     /// Adds a body of tetrahedra: `tets` is `(n, 4)` vertex indices, `positions` `(v, 3)`.
     /// Orientation does not matter; a flat tetrahedron is the flat set that it is.
     ///
+    /// Whether elements intersect is asked of the tetrahedra. Distances, steps, points and rays are
+    /// about the *surface*: the faces that are not between two tetrahedra. It bounds the body as
+    /// long as no tetrahedron is turned inside out, or over into its neighbour: then a face between
+    /// two lies at the border, and nothing stops there. So in a step that inverts one, other bodies
+    /// may get in, though it is [free](crate::Detector::is_free). A solver that lets them invert
+    /// looks at the signs of its volumes, or adds all faces as a body of triangles.
+    ///
     /// # Errors
     /// As [`add_triangles`](Scene::add_triangles).
     pub fn add_tetrahedra<R: Real>(

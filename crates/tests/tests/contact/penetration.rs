@@ -389,7 +389,7 @@ fn contacts_of_a_query_that_left_out_pairs_of_the_two_are_refused() {
         let contacts = detector.contacts(&scene, &pairs).unwrap();
         detector.penetration(&scene, &contacts, a, b)
     };
-    // The numbers of contacts change with those of other bodies.
+    // The numbers of contacts change where contacts of other bodies with the same faces are gone.
     let unnumbered = |mut found: Penetration| {
         for region in &mut found.regions {
             region.contacts = vec![0; region.contacts.len()];
@@ -397,7 +397,7 @@ fn contacts_of_a_query_that_left_out_pairs_of_the_two_are_refused() {
         found
     };
     let whole = ask(&Query::all(), [a, b]).unwrap();
-    let of_c = unnumbered(ask(&Query::all(), [a, c]).unwrap());
+    let of_c = ask(&Query::all(), [a, c]).unwrap();
     let offsets: Vec<u64> = (0..=n as u64).collect();
     let lists = Exclusion::vertices(a, b, offsets, vec![0; n]);
     for (query, why) in [
@@ -406,7 +406,11 @@ fn contacts_of_a_query_that_left_out_pairs_of_the_two_are_refused() {
         (Query::all().exclude(few), "pairs of an answer"),
     ] {
         // Nothing is left out of the pairs with the third body, nor by rings.
-        assert_eq!(unnumbered(ask(&query, [a, c]).unwrap()), of_c);
+        let found = ask(&query, [a, c]).unwrap();
+        match why {
+            "pairs of an answer" => assert_eq!(unnumbered(found), unnumbered(of_c.clone())),
+            _ => assert_eq!(found, of_c),
+        }
         let error = ask(&query, [a, b]).unwrap_err().to_string();
         let told = format!(
             "contacts: without some of the two, because of {why}, given, those of all pairs of the two allowed"

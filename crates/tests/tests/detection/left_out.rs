@@ -456,10 +456,15 @@ fn pairs_of_an_answer_are_left_out() {
     let query = Query::all().exclude(&at_rest).exclude(Exclusion::rings(1));
     let rings = Query::all().exclude(Exclusion::rings(1));
     check(&scene, &query, &scene, &rings, false, keeps);
-    // The look at the start of a step is at pairs of an answer, too.
-    let query = query.start(Start::Verify);
-    let free = detector.advance(&scene, &query).expect("good");
-    assert_eq!(free.start_intersects, Some(true));
+    // The look at the start of a step leaves out what the step does: all that intersects is near.
+    let intersects = |query: &Query, detector: &mut Detector| {
+        let query = query.clone().start(Start::Verify);
+        let taken = detector.advance(&scene, &query).expect("good");
+        taken.start_intersects
+    };
+    assert_eq!(intersects(&Query::between_all(), &mut detector), Some(true));
+    let between = Query::between_all().exclude(&at_rest);
+    assert_eq!(intersects(&between, &mut detector), Some(false));
     assert_eq!(query, query.clone());
     assert_ne!(query, rings);
 }
@@ -840,6 +845,64 @@ fn rings_of_fans_are_left_out() {
                     .iter()
                     .all(|w| *v != 0 && *w != 0 && v.abs_diff(*w) > 1)
             }));
+        }
+    }
+}
+
+/// What a body that takes no part was re-meshed to plays no part, in the scene that is asked about or
+/// in one that was asked about before.
+#[test]
+fn bodies_that_take_no_part_may_be_remeshed() {
+    let mut rest = Scene::new();
+    let [a, b, c] = [9u8, 7, 8].map(|n| {
+        let sheet = surfaces::cloth(n.into(), n.into(), 0.2);
+        let sheet = sheet.translated([0.0, 0.0, 0.05 * f32::from(n)]);
+        rest.add((sheet.elements, sheet.positions)).expect("good")
+    });
+    let mut detector = detectors().into_iter().next().expect("some");
+    // Only some vertices and faces of the first body are near those of others.
+    let query = Query::all().kinds([PairKind::VertexFace, PairKind::EdgeEdge]);
+    let at_rest = detector.near(&rest, 0.075, &query).expect("good");
+    let mut moved = rest.clone();
+    for (body, n) in [(a, 9u8), (b, 7), (c, 8)] {
+        let mut random = Random::new(n.into());
+        let sheet = surfaces::cloth(n.into(), n.into(), 0.2);
+        let crumpled = sheet.positions.iter().map(|p| {
+            let q = random.point(-0.2, 0.2);
+            [0, 1, 2].map(|axis| p[axis] + q[axis])
+        });
+        let crumpled: Vec<[f32; 3]> = crumpled.collect();
+        moved.set_positions(body, crumpled).expect("good");
+    }
+    let hash = |detector: &mut Detector, scene: &Scene, query: &Query| {
+        detector.detect(scene, query).expect("good").hash()
+    };
+    // An exclusion of its own, or one that all questions share.
+    let afresh = || Exclusion::from(&at_rest);
+    let shared = afresh();
+    let of_two = |exclusion| Query::between(b, c).exclude(exclusion);
+    let whole = |exclusion| Query::all().exclude(exclusion);
+    let expected = hash(&mut detector, &moved, &of_two(afresh()));
+    assert_ne!(expected, hash(&mut detector, &moved, &Query::between(b, c)));
+    let of_all = hash(&mut detector, &moved, &whole(afresh()));
+    for n in [2, 20] {
+        let mut remeshed = moved.clone();
+        let sheet = surfaces::cloth(n, n, 0.2);
+        let mesh = (sheet.elements, sheet.positions);
+        remeshed.remesh(a, mesh).expect("good");
+        for exclusion in [&afresh(), &shared] {
+            let [two, whole] = [of_two(exclusion.clone()), whole(exclusion.clone())];
+            assert_eq!(hash(&mut detector, &remeshed, &two), expected);
+            let error = detector
+                .detect(&remeshed, &whole)
+                .expect_err("other numbers");
+            assert!(
+                matches!(error, Error::Remeshed { body } if body == a),
+                "{error}"
+            );
+            // The same exclusion, in the scene that still has what it names.
+            assert_eq!(hash(&mut detector, &moved, &whole), of_all);
+            assert_eq!(hash(&mut detector, &moved, &two), expected);
         }
     }
 }

@@ -1149,7 +1149,7 @@ impl Twins {
 #[test]
 fn twins_have_the_same_impacts() {
     for seed in 0..6 {
-        let mut detector = detector(Method::Clusters, 1);
+        let mut detector = detector(Method::Clusters, 3);
         let twins = Twins::new(seed);
         let rows = twins.rows(false, &mut detector);
         assert!(!rows.is_empty());
@@ -1183,7 +1183,7 @@ fn twins_have_the_same_impacts() {
 #[test]
 fn a_step_is_its_two_halves() {
     for seed in 0..6 {
-        let mut detector = detector(Method::Clusters, 1);
+        let mut detector = detector(Method::Clusters, 3);
         let twins = Twins::new(seed);
         // The mean of two even numbers is an integer.
         let middle: [Vec<[f32; 3]>; 2] = std::array::from_fn(|body| {
