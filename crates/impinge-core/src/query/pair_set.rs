@@ -221,8 +221,8 @@ fn dimension_of(part: Part) -> Option<usize> {
     PARTS.iter().position(|&of| of == part)
 }
 
-/// The body that a part is of, if its elements still have the numbers that pairs name. One that does
-/// not take part in a question may be gone, or have others.
+/// The body that a part is of, if its elements still have the numbers that pairs name. One that
+/// does not take part in a question may be gone, or have others.
 fn fitting<'a>(scene: &'a Scene, &(id, part, stamp): &NumberedPart) -> Option<&'a Body> {
     let body = scene.body(id).ok()?;
     (body.numbers_stamp(part) == stamp).then_some(body)
