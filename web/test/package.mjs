@@ -20,7 +20,7 @@ import { launch, serve } from "./browser.mjs";
 // these contains), bounds and lists 8, truncate 7. Together 7 more: the nearest few, locate, signedDistance, candidatesInRuns, groups,
 // pinned vertices and pairs at rest, which the other languages have; 11 more: thickness by element and distances rounded down; 6 more: lists
 // of near pairs with a margin; 6 more: excluded pairs as bits; 4 more: surfaces turned
-// inwards, contacts that are not all, bodies of another scene, truncation of any size.
+// inwards, contacts that are not all, bodies of another scene, truncation of any size; 3 more: pairs at rest in intersections.
 const MOST_BROTLI = 418_000;
 
 const [built, scenesFile] = process.argv.slice(2);

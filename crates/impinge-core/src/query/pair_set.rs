@@ -277,13 +277,14 @@ impl PairsOfElements {
         }
     }
 
-    /// Whether these are of all parts that pairs name and that are in the scene as they were.
+    /// Whether these are of all parts that pairs name and that are in the scene as they were. Those
+    /// of other parts play no part: none of their elements is asked about.
     fn is_of(&self, scene: &Scene, pairs: &HeldPairs) -> bool {
         pairs.parts.iter().all(|named| {
             let &(id, part, _) = named;
             let of = self.of(id).zip(dimension_of(part));
             let is_held = of.is_some_and(|(of, dimension)| of.0[dimension].is_some());
-            fitting(scene, named).is_some() == is_held
+            is_held || fitting(scene, named).is_none()
         })
     }
 
