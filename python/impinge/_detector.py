@@ -271,7 +271,8 @@ class Detector(DetectorBase):
         """Whether nothing touches during a step; with ``start="skip"``, but for pairs that touch at its start.
 
         Elements that intersect all the way, an edge deep in a face, touch nothing new: a step is free only of what begins. If the
-        start was free of intersections, so is each moment of a free step; ``start="verify"`` asks that, too.
+        start was free of intersections, so is each moment of a free step; ``start="verify"`` asks that, too. Tetrahedra take part with
+        their surface: that the step turns one inside out is not noticed.
 
         Parameters
         ----------

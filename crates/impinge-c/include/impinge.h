@@ -111,7 +111,8 @@ void impinge_scene_destroy(impinge_scene *scene);
 impinge_status impinge_scene_add_triangles(impinge_scene *scene, impinge_array faces, impinge_array positions, uint32_t *body);
 
 /* Adds a body of tetrahedra, as impinge_scene_add_triangles. `tetrahedra` has 4 columns. Orientation does not matter; a flat one is the
- * flat set that it is. */
+ * flat set that it is. Whether elements intersect is asked of the tetrahedra; distances, steps, points and rays are about their surface, the
+ * faces that are not between two of them. It does not bound a body where one is turned inside out: nothing stops at such a face. */
 impinge_status impinge_scene_add_tetrahedra(impinge_scene *scene, impinge_array tetrahedra, impinge_array positions, uint32_t *body);
 
 /* Adds a body of edges, such as strands of hair, as impinge_scene_add_triangles. `edges` has 2 columns. */

@@ -200,7 +200,8 @@ impl Detector {
     ///
     /// If the start was free of intersections, so is each moment of a free step. Of bodies that
     /// already pass through each other it says nothing, unless [`Start::Verify`] asks: then a step
-    /// whose start intersects is not free.
+    /// whose start intersects is not free. Tetrahedra that the step inverts are not noticed, see
+    /// [`add_tetrahedra`](Scene::add_tetrahedra).
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts).
