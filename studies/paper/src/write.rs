@@ -27,8 +27,8 @@ impl Outcome {
         }
         let document = chapters::all(&self.report);
         put("report.md", markdown::write(&document).as_bytes())?;
-        // Plain data: numbers, strings and lists.
-        let json = serde_json::to_string_pretty(&self.report)
+        // Plain data: numbers, strings and lists, on one line: most of it is of single frames.
+        let json = serde_json::to_string(&self.report)
             .map_err(|error| failed(&folder.join("report.json"), error.into()))?;
         put("report.json", (json + "\n").as_bytes())
     }
