@@ -382,6 +382,8 @@ def test_rows_of_four():
     for rows in [QUADS, QUADS[:1], TETS[:1], np.array([[0, 1, 3, 2], [0, 1, 3, 2]])]:
         with pytest.raises(ValueError, match='^faces: rows of four are tetrahedra or quads.*kind="quads"'):
             scene.add(GRID, rows)
+        with pytest.raises(ValueError, match='^faces_b: rows of four.*kind_b="tetrahedra", or kind_b="quads"'):
+            impinge.pairs(CORNERS, TETS, GRID, rows)
         assert scene.kind(scene.add(GRID, rows, "tetrahedra")) == "tetrahedra"
     quads = scene.add(GRID, QUADS, kind="quads")
     assert scene.elements(quads).tolist() == [[0, 1, 3], [0, 3, 2], [1, 4, 5], [1, 5, 3]]

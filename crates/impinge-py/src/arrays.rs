@@ -111,9 +111,14 @@ pub fn elements(
         (3, _) => Elements::Triangles(indices.as_chunks().0.to_vec()),
         (_, Some(RowKind::Quads)) => Elements::Triangles(cut_quads(indices.as_chunks().0)),
         (_, None) if !are_tetrahedra(indices.as_chunks().0) => {
+            // Of two meshes: faces_a, kind_a.
+            let of = match name.rsplit_once('_') {
+                Some((_, of @ ("a" | "b"))) => format!("_{of}"),
+                _ => String::new(),
+            };
             return Err(invalid(format!(
                 "{name}: rows of four are tetrahedra or quads, and no two of them share three vertices, which would \
-                 tell: say kind=\"tetrahedra\", or kind=\"quads\" to cut each into two triangles"
+                 tell: say kind{of}=\"tetrahedra\", or kind{of}=\"quads\" to cut each into two triangles"
             )));
         }
         _ => Elements::Tetrahedra(indices.as_chunks().0.to_vec()),
