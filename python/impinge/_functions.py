@@ -97,8 +97,8 @@ def pairs(
     array([], shape=(0, 2), dtype=uint32)
     """
     scene = Scene()
-    scene._add_named(vertices_a, faces_a, kind_a, ("vertices_a", "faces_a"), weld)
-    scene._add_named(vertices_b, faces_b, kind_b, ("vertices_b", "faces_b"), weld)
+    scene._add_named(vertices_a, faces_a, kind_a, ("vertices_a", "faces_a", "kind_a"), weld)
+    scene._add_named(vertices_b, faces_b, kind_b, ("vertices_b", "faces_b", "kind_b"), weld)
     settings.setdefault("backend", "cpu")
     found = Detector(**settings)._detect(scene, {"between": (0, 1)})
     return found.between(0, 1)
@@ -427,7 +427,7 @@ def _one_mesh(
 ) -> tuple[Scene, Detector]:
     """A scene of one mesh, and a detector, on the CPU unless the settings say otherwise."""
     scene = Scene()
-    scene._add_named(vertices, faces, kind, ("vertices", name), weld)
+    scene._add_named(vertices, faces, kind, ("vertices", name, "kind"), weld)
     settings.setdefault("backend", "cpu")
     return scene, Detector(**settings)
 

@@ -128,7 +128,7 @@ class SceneBase:
         vertices: _Array,
         elements: _Array,
         kind: str | None,
-        names: tuple[str, str],
+        names: tuple[str, str, str],
         weld: bool,
     ) -> None: ...
     def _add_many(

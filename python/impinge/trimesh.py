@@ -70,7 +70,7 @@ class _OfMesh:
             if np.array_equal(vertices, self._read[0]) and np.array_equal(faces, self._read[1]):
                 return self._scene
         self._scene = Scene()
-        self._scene._add_named(vertices, faces, "triangles", ("vertices", "faces"), True)
+        self._scene._add_named(vertices, faces, "triangles", ("vertices", "faces", "kind"), True)
         self._read = vertices.copy(), faces.copy()
         return self._scene
 

@@ -384,6 +384,8 @@ def test_rows_of_four():
             scene.add(GRID, rows)
         with pytest.raises(ValueError, match='^faces_b: rows of four.*kind_b="tetrahedra", or kind_b="quads"'):
             impinge.pairs(CORNERS, TETS, GRID, rows)
+        with pytest.raises(ValueError, match='^kind_b: "quad" given'):
+            impinge.pairs(CORNERS, TETS, GRID, rows, kind_b="quad")
         assert scene.kind(scene.add(GRID, rows, "tetrahedra")) == "tetrahedra"
     quads = scene.add(GRID, QUADS, kind="quads")
     assert scene.elements(quads).tolist() == [[0, 1, 3], [0, 3, 2], [1, 4, 5], [1, 5, 3]]

@@ -15,7 +15,7 @@ use numpy::{
 use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::errors::{invalid, number};
+use crate::errors::{Names, invalid, number};
 
 /// Positions in the precision in which they are answered, in C order.
 pub enum PositionArray<'py> {
@@ -93,10 +93,11 @@ pub enum RowKind {
 /// become triangles.
 pub fn elements(
     argument: &Bound<'_, PyAny>,
-    name: &str,
+    names: Names<'_>,
     kind: Option<RowKind>,
     n_vertices: usize,
 ) -> PyResult<Elements> {
+    let name = names.elements;
     let allowed: &[usize] = match kind {
         None => &[3, 4],
         Some(RowKind::Of(BodyKind::Points)) => &[1],
@@ -111,14 +112,10 @@ pub fn elements(
         (3, _) => Elements::Triangles(indices.as_chunks().0.to_vec()),
         (_, Some(RowKind::Quads)) => Elements::Triangles(cut_quads(indices.as_chunks().0)),
         (_, None) if !are_tetrahedra(indices.as_chunks().0) => {
-            // Of two meshes: faces_a, kind_a.
-            let of = match name.rsplit_once('_') {
-                Some((_, of @ ("a" | "b"))) => format!("_{of}"),
-                _ => String::new(),
-            };
+            let kind = names.kind;
             return Err(invalid(format!(
                 "{name}: rows of four are tetrahedra or quads, and no two of them share three vertices, which would \
-                 tell: say kind{of}=\"tetrahedra\", or kind{of}=\"quads\" to cut each into two triangles"
+                 tell: say {kind}=\"tetrahedra\", or {kind}=\"quads\" to cut each into two triangles"
             )));
         }
         _ => Elements::Tetrahedra(indices.as_chunks().0.to_vec()),

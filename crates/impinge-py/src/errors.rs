@@ -25,6 +25,8 @@ pub struct Names<'a> {
     pub vertices: &'a str,
     /// The argument with vertex indices.
     pub elements: &'a str,
+    /// The argument that says what rows of these are.
+    pub kind: &'a str,
 }
 
 /// An error of a call that took no arrays.
@@ -54,7 +56,9 @@ pub fn raise_as(error: Error, message: String) -> PyErr {
 
 /// An error of a call that took arrays: positions are named by the index into the argument.
 pub fn refuse(error: Error, names: Names<'_>) -> PyErr {
-    let Names { vertices, elements } = names;
+    let Names {
+        vertices, elements, ..
+    } = names;
     let message = match &error {
         Error::NonFinitePosition { vertex, value, .. } => {
             let axis = value.iter().position(|x| !x.is_finite()).unwrap_or(0);

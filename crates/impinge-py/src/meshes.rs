@@ -33,6 +33,7 @@ pub fn parts<'py>(mesh: &Bound<'py, PyAny>, kind: Option<RowKind>) -> PyResult<P
                     names: Names {
                         vertices: "mesh.vertices",
                         elements,
+                        kind: "kind",
                     },
                 });
             }
@@ -50,6 +51,7 @@ pub fn parts<'py>(mesh: &Bound<'py, PyAny>, kind: Option<RowKind>) -> PyResult<P
             names: Names {
                 vertices: "mesh.points",
                 elements: "mesh.cells",
+                kind: "kind",
             },
         });
     }

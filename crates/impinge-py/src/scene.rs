@@ -17,6 +17,7 @@ use crate::settings::{self, Argument, flags, length, unsigned};
 const ARGUMENTS: Names<'static> = Names {
     vertices: "vertices",
     elements: "faces",
+    kind: "kind",
 };
 
 /// What `impinge.Scene` is made of.
@@ -79,7 +80,7 @@ impl Scene {
         weld: bool,
     ) -> PyResult<BodyId> {
         let positions = PositionArray::new(vertices, names.vertices)?;
-        let mut elements = arrays::elements(elements, names.elements, kind, positions.len())?;
+        let mut elements = arrays::elements(elements, names, kind, positions.len())?;
         let held = if weld {
             let (weld, welded) = welded(&positions)?;
             elements = apply(&weld, &elements);
@@ -198,7 +199,7 @@ impl Scene {
         faces: Argument<'_, '_>,
         kind: Argument<'_, '_>,
     ) -> PyResult<Body> {
-        let kind = settings::kind(kind)?;
+        let kind = settings::kind(kind, ARGUMENTS.kind)?;
         let id = match faces {
             Some(faces) => change(slf)?.add_named(vertices, faces, kind, ARGUMENTS)?,
             None => {
@@ -216,14 +217,15 @@ impl Scene {
         vertices: &Bound<'_, PyAny>,
         elements: &Bound<'_, PyAny>,
         kind: Argument<'_, '_>,
-        names: (String, String),
+        names: (String, String, String),
         #[pyo3(from_py_with = flags::weld)] weld: bool,
     ) -> PyResult<()> {
         let names = Names {
             vertices: &names.0,
             elements: &names.1,
+            kind: &names.2,
         };
-        let kind = settings::kind(kind)?;
+        let kind = settings::kind(kind, names.kind)?;
         change(slf)?.add_welded(vertices, elements, kind, names, weld)?;
         Ok(())
     }
@@ -236,14 +238,14 @@ impl Scene {
         face_offsets: &Bound<'_, PyAny>,
         kind: Argument<'_, '_>,
     ) -> PyResult<Vec<Body>> {
-        let kind = settings::kind(kind)?;
+        let kind = settings::kind(kind, ARGUMENTS.kind)?;
         if kind == Some(RowKind::Quads) {
             return Err(invalid(
                 "kind: \"quads\" given, which would move the offsets; cut them into triangles first",
             ));
         }
         let positions = PositionArray::new(vertices, "vertices")?;
-        let elements = arrays::elements(faces, "faces", kind, positions.len())?;
+        let elements = arrays::elements(faces, ARGUMENTS, kind, positions.len())?;
         let of_vertices = arrays::offsets(vertex_offsets, "vertex_offsets")?;
         let of_faces = arrays::offsets(face_offsets, "face_offsets")?;
         let mut scene = change(slf)?;
@@ -275,8 +277,8 @@ impl Scene {
         edges: &Bound<'_, PyAny>,
     ) -> PyResult<Body> {
         let names = Names {
-            vertices: "vertices",
             elements: "edges",
+            ..ARGUMENTS
         };
         let mut scene = change(slf)?;
         let id = scene.add_named(vertices, edges, Some(RowKind::Of(BodyKind::Edges)), names)?;
@@ -349,8 +351,8 @@ impl Scene {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
         let positions = PositionArray::new(vertices, ARGUMENTS.vertices)?;
-        let kind = settings::kind(kind)?;
-        let elements = arrays::elements(faces, ARGUMENTS.elements, kind, positions.len())?;
+        let kind = settings::kind(kind, ARGUMENTS.kind)?;
+        let elements = arrays::elements(faces, ARGUMENTS, kind, positions.len())?;
         scene
             .inner
             .remesh(id, (elements, stored(&positions)?))
@@ -673,7 +675,7 @@ impl Scene {
                 gaps.push(scene.inner.add_points::<f32>(&[]).map_err(raise)?);
             }
             let (kind, vertices, elements) = (item(1)?, item(2)?, item(3)?);
-            let kind = settings::kind(Some(&kind))?;
+            let kind = settings::kind(Some(&kind), ARGUMENTS.kind)?;
             let id = scene.add_named(&vertices, &elements, kind, ARGUMENTS)?;
             let matrix = item(4)?;
             if !matrix.is_none() {

@@ -119,13 +119,13 @@ pub mod flags {
 }
 
 /// What the rows of an index array are; `None` leaves it to their length.
-pub fn kind(argument: Argument<'_, '_>) -> PyResult<Option<RowKind>> {
+pub fn kind(argument: Argument<'_, '_>, name: &str) -> PyResult<Option<RowKind>> {
     let mut kinds = BodyKind::ALL
         .map(|kind| (kind.name(), Some(RowKind::Of(kind))))
         .to_vec();
     kinds.push(("quads", Some(RowKind::Quads)));
     match argument {
-        Some(argument) => choose_one(argument, "kind", &kinds),
+        Some(argument) => choose_one(argument, name, &kinds),
         None => Ok(None),
     }
 }
