@@ -363,10 +363,8 @@ impl Plan {
             return false;
         };
         let parts = [self.part(a.0), self.part(b.0)];
-        let kind = match self.question {
-            Question::Intersection => None,
-            _ => PairKind::of(parts[0].part, parts[1].part),
-        };
+        // Elements that bodies were given as are of no kind.
+        let kind = PairKind::of(parts[0].part, parts[1].part);
         left_out.has_marked([a, b])
             || left_out.has_listed((kind, key), [a, b], parts.map(|part| part.id))
     }
