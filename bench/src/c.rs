@@ -147,9 +147,8 @@ pub fn runners(problem: &Problem, options: &Options) -> Result<Vec<Box<dyn Runne
     let mut runners: Vec<Box<dyn Runner>> = Vec::new();
     if let Some(library) = &options.c_library {
         // As the contestants in Rust: one thread, too, if no number is named.
-        let all = [options.threads, 1];
-        let n = if options.threads == 0 { 2 } else { 1 };
-        for &threads in &all[..n] {
+        let single = (options.threads == 0).then_some(1);
+        for threads in std::iter::once(options.threads).chain(single) {
             for feed in [Feed::Copied, Feed::Lent] {
                 runners.push(Box::new(Through::new(problem, library, threads, feed)?));
             }

@@ -21,7 +21,7 @@ pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
     for question in ["safe_distances", "neighbours", "impacts", "truncate"] {
         header += &format!(" `{question}` ms | ns per face |");
     }
-    each_size(header + "\n", options, report, measure)
+    each_size(header, options, report, measure)
 }
 
 fn measure(mut layers: Layers, options: &Options, report: &mut Report) -> Result<(), Failure> {

@@ -113,19 +113,19 @@ pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
     for question in QUESTIONS {
         header += &format!(" `{question}` ms | ns per face |");
     }
-    header += " `candidates` ms | ns per candidate | bytes per element, `impacts` | without its answer | bytes per element, `candidates` |\n";
+    header += " `candidates` ms | ns per candidate | bytes per element, `impacts` | without its answer | bytes per element, `candidates` |";
     each_size(header, options, report, measure)
 }
 
-/// A table of all sizes up to the one that the options name, with 14 columns.
+/// A table of all sizes up to the one that the options name.
 pub fn each_size(
-    mut header: String,
+    header: String,
     options: &Options,
     report: &mut Report,
     measure: impl Fn(Layers, &Options, &mut Report) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    header += &"|---:".repeat(14);
-    report.say(&(header + "|"));
+    let n_columns = header.matches('|').count() - 1;
+    report.say(&format!("{header}\n{}|", "|---:".repeat(n_columns)));
     for n_faces in SIZES {
         if options.size.is_none_or(|largest| n_faces <= largest) {
             measure(Layers::new(n_faces)?, options, report)?;
