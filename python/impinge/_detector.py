@@ -327,7 +327,8 @@ class Detector(DetectorBase):
         `clearance` do so at every moment. Elements that do not meet are not stopped. Where two do, the vertices that go
         towards the other element stop before planes between the two, and pairs of which a vertex was stopped are looked at again;
         so some stop that might have passed, and the next step takes them farther. A body whose end `Scene.set_end_transform` made
-        stops as a whole: all of its vertices go the least share of their ways that one of them may go.
+        stops as a whole: all of its vertices go the least share of their ways that one of them may go. Tetrahedra take part with
+        their surface, as in `is_free`.
 
         Parameters
         ----------
@@ -482,7 +483,8 @@ class Detector(DetectorBase):
         For each pair of elements that do not share a vertex, the largest number of the vertices of one and the largest of the other add
         up to less than their distance, minus the thickness of both bodies (`Scene.set_thickness`). Both get half of it; what is
         `fixed` gets 0 and leaves all of it to the other. Each number is rounded down: it is never above what the smallest distance
-        of its vertex allows, and below that by at most 2**-10 of it. Vertices of pairs that touch get 0.
+        of its vertex allows, and below that by at most 2**-10 of it. Vertices of pairs that touch get 0. Tetrahedra take part with their
+        surface, as in `is_free`.
 
         So a solver may move every vertex by its number, in any direction and in any order, without a test in between. What counts is the
         motion to the new position as it was rounded. End positions are ignored.

@@ -65,7 +65,9 @@ impl Detector {
     /// So a solver may move every vertex by its number, in any direction and in any order, and
     /// needs no test in between. The motion of a vertex is what it really does: rounding of its new
     /// position counts. The bodies' end positions are ignored, and so are pairs of elements of one
-    /// body that share a vertex, which no numbers above 0 could keep apart.
+    /// body that share a vertex, which no numbers above 0 could keep apart. Tetrahedra take part
+    /// with their surface: that they turn inside out is not noticed, see
+    /// [`add_tetrahedra`](Scene::add_tetrahedra).
     ///
     /// ```
     /// use impinge::{Backend, Bounds, Detector, Query, Scene};
