@@ -55,8 +55,12 @@ pub fn parts<'py>(mesh: &Bound<'py, PyAny>, kind: Option<RowKind>) -> PyResult<P
             },
         });
     }
+    let hint = match kind {
+        Some(RowKind::Of(BodyKind::Points)) => " (add_points takes all vertices as points)",
+        _ => "",
+    };
     Err(PyTypeError::new_err(format!(
-        "faces: none given with a {}, which is no mesh: vertices and faces expected, or an object that has them",
+        "faces: none given with a {}, which is no mesh: vertices and faces expected, or an object that has them{hint}",
         mesh.get_type().name()?
     )))
 }

@@ -30,7 +30,7 @@ use crate::search::stats::Stats;
 ///
 /// One submission may have one frame ([`encode`](Gpu::encode)), one step
 /// ([`encode_step`](Gpu::encode_step)) or question about safe distances
-/// ([`encode_safe_distances`](Gpu::encode_safe_distances)), and one truncation
+/// ([`encode_safe_distances`](Gpu::encode_safe_distances)), and truncations
 /// ([`encode_truncate`](Gpu::encode_truncate)), in one encoder. Each has the buffers that it was
 /// given. Do not change the scene between these calls: all may get its positions as they are at the
 /// last one.
@@ -254,9 +254,8 @@ impl Gpu<'_> {
     /// safe distances again. Whether a body has moved since is not checked: that is a matter of
     /// `starts`.
     ///
-    /// Buffers hold `(v, 3)` f32 coordinates, and need the usage `STORAGE`. At most one truncation
-    /// may be encoded per submission: earlier ones would run with parameters of the last one, and
-    /// move vertices farther than is safe.
+    /// Buffers hold `(v, 3)` f32 coordinates, and need the usage `STORAGE`. Bodies may be divided
+    /// among several calls in one submission.
     ///
     /// # Errors
     /// Safe distances that are not the last ones of this detector, or of a body that is no longer

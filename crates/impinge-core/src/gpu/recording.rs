@@ -70,6 +70,12 @@ impl Recording {
         &self.launches
     }
 
+    /// The parameters of each launch that has some.
+    fn steps(&self) -> impl Iterator<Item = Step> {
+        let params = self.launches.iter().filter_map(Launch::params);
+        params.map(Step::from)
+    }
+
     /// Begins a stage.
     pub fn stage(&mut self, name: &'static str) {
         self.stages.push(name);
@@ -360,17 +366,21 @@ impl Launcher {
         Ok(all)
     }
 
+    /// Whether the parameters of a recording are those on the device.
+    pub fn has_sent(&self, recording: &Recording) -> bool {
+        self.params.bytes() != 0 && recording.steps().eq(self.sent.iter().copied())
+    }
+
     /// Sends the parameters, if they differ from those on the device, and binds all buffers.
     #[expect(
         clippy::mutable_key_type,
         reason = "wgpu hashes a buffer by its identity, which stays"
     )]
     fn prepare(&mut self, gpu: &GpuContext, recording: &Recording) -> Result<Vec<Ready>, Error> {
-        let params = recording.launches.iter().filter_map(Launch::params);
-        let planned: Vec<Step> = params.map(Step::from).collect();
-        if planned != self.sent || self.params.bytes() == 0 {
-            self.params.upload(gpu, &planned)?;
-            self.sent = planned;
+        if !self.has_sent(recording) {
+            let steps = Vec::from_iter(recording.steps());
+            self.params.upload(gpu, &steps)?;
+            self.sent = steps;
         }
         let mut before = std::mem::take(&mut self.groups);
         let mut next = 0;

@@ -10,7 +10,7 @@ use super::engine::Engine;
 use super::kernels::Truncate;
 use super::layout::{Counter, N_PAIRS_LISTED, N_UNSURE_LISTED, Params, Share, TOUCHES_BY};
 use super::pass_buffers::{NextPass, PassCounts};
-use super::recording::{Recording, Workgroups};
+use super::recording::{Launcher, Recording, Workgroups};
 use super::view::Motion;
 use super::world::ResidentEnds;
 use crate::bvh::clusters::Clustering;
@@ -394,6 +394,10 @@ impl Engine {
             };
             let groups = Workgroups::Known(n_vertices.div_ceil(u64::from(GROUP)));
             recording.launch(&self.gpu.kernels.truncate, &bindings, groups);
+        }
+        if !self.truncations.has_sent(&recording) {
+            // Those before may not have been submitted: they keep their parameters.
+            self.truncations = Launcher::default();
         }
         self.truncations
             .encode(&self.gpu, &recording, None, encoder)
