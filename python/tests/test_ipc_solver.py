@@ -1,4 +1,4 @@
-"""An implicit solver with ipc-toolkit's barrier: `impinge.ipc` decides how far its steps go.
+"""An implicit solver with ipc-toolkit's barrier: `impinge.ipc` finds its collisions and decides how far its steps go.
 
 Barrier potential, gradient and Hessian are ipctk's; the rest is here. The same solver also runs
 with ipctk's step size.
@@ -14,6 +14,8 @@ from impinge import ipc
 ipctk = pytest.importorskip("ipctk", reason="ipctk is not installed: no barrier")
 sparse = pytest.importorskip("scipy.sparse", reason="SciPy is not installed: no solver")
 from scipy.sparse.linalg import splu  # noqa: E402
+
+from test_ipc_broad_phase import assert_same_collisions  # noqa: E402
 
 #: Distance at which the barrier begins.
 DHAT = 1e-2
@@ -47,7 +49,7 @@ def octahedron(radius):
 class Cloth:
     """A cloth of springs that falls on an octahedron, by implicit Euler and Newton's method."""
 
-    def __init__(self, n, step_size):
+    def __init__(self, n, step_size, broad_phase=None):
         cloth, faces = grid(n, 1.0, 0.36)
         ball, faces_of_ball = octahedron(0.3)
         self.n = len(cloth)
@@ -58,6 +60,7 @@ class Cloth:
         self.mesh = ipctk.CollisionMesh(self.x, self.edges, faces)
         self.barrier = ipctk.BarrierPotential(DHAT, BARRIER)
         self.step_size = step_size
+        self.broad_phase = broad_phase
         springs = self.edges[(self.edges < self.n).all(axis=1)]
         # Every second vertex of a line as well: against bending.
         index = np.arange(self.n).reshape(n, n)
@@ -74,9 +77,14 @@ class Cloth:
         self.n_iterations = self.n_states = 0
 
     def collisions(self, x):
-        collisions = ipctk.NormalCollisions()
-        collisions.build(self.mesh, x, DHAT)
-        return collisions
+        theirs = ipctk.NormalCollisions()
+        theirs.build(self.mesh, x, DHAT)
+        if self.broad_phase is None:
+            return theirs
+        ours = ipctk.NormalCollisions()
+        ours.build(self.mesh, x, DHAT, broad_phase=self.broad_phase)
+        assert_same_collisions(ours, theirs)
+        return ours
 
     def energy(self, x, goal):
         d = x[self.springs[:, 0]] - x[self.springs[:, 1]]
@@ -152,18 +160,18 @@ class Cloth:
         self.v = (self.x[: self.n] - start) / FRAME
 
 
-def run(n, n_frames, step_size):
-    cloth = Cloth(n, step_size)
+def run(n, n_frames, *stage):
+    cloth = Cloth(n, *stage)
     for _ in range(n_frames):
         cloth.frame()
     return cloth
 
 
 def test_a_solver_needs_no_more_iterations_than_with_ipc_toolkit():
-    """300 frames; a larger cloth with IMPINGE_LONG=1."""
+    """300 frames, each with the same collisions; a larger cloth with IMPINGE_LONG=1."""
     ipctk.set_logger_level(ipctk.LoggerLevel.off)
     n = 14 if os.environ.get("IMPINGE_LONG") else 7
-    ours = run(n, 300, ipc.compute_collision_free_stepsize)
+    ours = run(n, 300, ipc.compute_collision_free_stepsize, ipc.BroadPhase())
     theirs = run(n, 300, ipctk.compute_collision_free_stepsize)
     counts = [(cloth.n_iterations, cloth.n_states) for cloth in (ours, theirs)]
     print("iterations and states, ours and theirs:", counts)
