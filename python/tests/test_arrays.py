@@ -406,3 +406,18 @@ def test_empty_bodies():
     assert impinge.self_pairs(*ball()[:1], no_faces).shape == (0, 2)
     with pytest.raises(ValueError, match=r"^faces\[0, 0\] = 0: there are 0 vertices"):
         impinge.self_pairs(nothing, [[0, 0, 0]])
+
+
+def test_nothing_is_no_rows():
+    assert impinge.pairs([], [], TRIANGLE, FACE).shape == (0, 2)
+    scene = impinge.Scene()
+    assert scene.n_elements(scene.add(TRIANGLE, [])) == 0
+    assert scene.n_elements(scene.add_points([])) == 0
+    body = scene.add(TRIANGLE, FACE)
+    assert len(impinge.Detector("cpu").cast(scene, [], [])) == 0
+    with pytest.raises(ValueError, match="3"):
+        scene.set_positions(body, [])
+    with pytest.raises(ValueError, match=r"^vertices: shape \(n, 3\) expected, \(2,\) given"):
+        scene.add([1.0, 2.0], FACE)
+    with pytest.raises(TypeError, match=r"add_points takes all vertices as points\)$"):
+        scene.add(TRIANGLE, kind="points")

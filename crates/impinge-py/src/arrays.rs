@@ -26,8 +26,7 @@ pub enum PositionArray<'py> {
 impl<'py> PositionArray<'py> {
     /// Takes the argument `name` as `(n, 3)` positions.
     pub fn new(argument: &Bound<'py, PyAny>, name: &str) -> PyResult<Self> {
-        let array = as_rows(argument, name, &[3])?;
-        let kind = NumberKind::of(&array, name)?;
+        let (array, kind) = as_rows(argument, name, &[3])?;
         match kind {
             // Half precision widens to single without loss.
             NumberKind::Float(2 | 4) => Ok(PositionArray::F32(in_c_order(&array, "=f4")?)),
@@ -254,8 +253,7 @@ pub fn numbers(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
 
 /// Rows `(n, n_columns)` of unsigned 32-bit numbers, row after row.
 pub fn rows(argument: &Bound<'_, PyAny>, name: &str, n_columns: usize) -> PyResult<Vec<u32>> {
-    let array = as_rows(argument, name, &[n_columns])?;
-    let numbers = NumberKind::of(&array, name)?;
+    let (array, numbers) = as_rows(argument, name, &[n_columns])?;
     indices(&array, numbers, name)
 }
 
@@ -267,8 +265,7 @@ pub fn index_rows(
     allowed: &[usize],
     n_vertices: usize,
 ) -> PyResult<(Vec<u32>, usize)> {
-    let array = as_rows(argument, name, allowed)?;
-    let numbers = NumberKind::of(&array, name)?;
+    let (array, numbers) = as_rows(argument, name, allowed)?;
     let n_columns = array.shape()[1];
     let indices = indices(&array, numbers, name)?;
     check_indices(&indices, n_columns, name, n_vertices)?;
@@ -367,18 +364,20 @@ fn as_array<'py>(argument: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py
     Ok(array.cast_into::<PyUntypedArray>()?)
 }
 
-/// An array of rows, of one of the lengths allowed. Nothing at all, `[]`, is no rows of the first.
+/// An array of numbers in rows, of one of the lengths allowed. Nothing at all, `[]`, is no rows of
+/// the first.
 fn as_rows<'py>(
     argument: &Bound<'py, PyAny>,
     name: &str,
     allowed: &[usize],
-) -> PyResult<Bound<'py, PyUntypedArray>> {
+) -> PyResult<(Bound<'py, PyUntypedArray>, NumberKind)> {
     let array = as_array(argument, name)?;
+    let kind = NumberKind::of(&array, name)?;
     match *array.shape() {
-        [_, n_columns] if allowed.contains(&n_columns) => Ok(array),
+        [_, n_columns] if allowed.contains(&n_columns) => Ok((array, kind)),
         [0] => {
             let none = array.call_method1("reshape", ((0, allowed[0]),))?;
-            Ok(none.cast_into::<PyUntypedArray>()?)
+            Ok((none.cast_into::<PyUntypedArray>()?, kind))
         }
         _ => {
             let expected: Vec<String> = allowed.iter().map(|n| format!("(n, {n})")).collect();
