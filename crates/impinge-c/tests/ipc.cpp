@@ -255,6 +255,17 @@ void refusals() {
   CHECK(impinge::ipc::compute_collision_free_stepsize(mesh, at, at) == 1);
   mesh.can_collide = ::ipc::CollisionMesh(at, edges, faces).can_collide;
 
+  for (const double rescaling : {1.5, 0.0, -1.0, std::nan("")}) {
+    std::ostringstream expected;
+    expected << "conservative_rescaling: " << rescaling << " given, above 0 and at most 1 allowed";
+    CHECK(said_by([&] { impinge::ipc::compute_collision_free_stepsize(mesh, at, at, 0, rescaling); }) == expected.str());
+    impinge::ipc::NarrowPhaseCCD ccd;
+    ccd.conservative_rescaling = rescaling;
+    double toi = 1;
+    const Eigen::Vector3d a(0, 0, 0), b(1, 0, 0);
+    CHECK(said_by([&] { ccd.point_point_ccd(a, b, b, b, toi); }) == expected.str());
+  }
+
   Eigen::MatrixXd bad = at;
   bad(4, 1) = std::numeric_limits<double>::quiet_NaN();
   const Eigen::MatrixXd few = at.topRows(4), flat = at.leftCols(2);
@@ -277,6 +288,31 @@ void refusals() {
   CHECK(said_by([&] { ours.build(at, twice, faces); }) == "edges[0] and edges[3]: both are the edge (0, 1)");
 }
 
+// Elements that touch allow no step, which takes a second question to say. One that was cancelled says that, and no step size.
+void cancelled() {
+  Eigen::MatrixXd start(4, 3), end;
+  start << -1, -1, 0, 1, -1, 0, 0, 1, 0, 0, 0, 0.5;
+  Eigen::MatrixXi edges(3, 2), faces(1, 3);
+  edges << 0, 1, 1, 2, 0, 2;
+  faces << 0, 1, 2;
+  const ::ipc::CollisionMesh mesh(start, edges, faces);
+  start(3, 2) = 0;
+  end = start;
+  end(3, 2) = -1;
+  CHECK(impinge::ipc::compute_collision_free_stepsize(mesh, start, end) == 0);
+  int n_asked = 0;
+  auto &asked = impinge::ipc::detail::of_mesh(mesh).detector();
+  asked = impinge::detector(impinge::settings(impinge::backend::cpu).cancelled([&] { return n_asked++ == 0; }));
+  impinge_status status = IMPINGE_OK;
+  try {
+    impinge::ipc::compute_collision_free_stepsize(mesh, start, end);
+  } catch (const impinge::error &error) {
+    status = error.status();
+  }
+  CHECK(status == IMPINGE_ERROR_CANCELLED && n_asked > 0);
+  asked = impinge::detector(impinge::backend::cpu);
+}
+
 // What ipc-toolkit's functions do not ask in this way, but a solver may ask a broad phase.
 void asked_alone(impinge::ipc::mode mode, const model &of) {
   impinge::ipc::BroadPhase ours(mode);
@@ -287,13 +323,18 @@ void asked_alone(impinge::ipc::mode mode, const model &of) {
   lbvh.build(of.start, none, of.faces, 0.05);
   CHECK(n_ee(ours) == 0 && n_ee(lbvh) == 0 && n_ev(ours) == 0 && n_fv(ours) > 0);
 
-  // After positions that are refused it has found nothing.
+  // Before a build, after clear and after positions that are refused, there is nothing to ask for.
+  const std::string nothing = "BroadPhase: nothing is built: build it first, also after clear() and after a build that failed";
+  const impinge::ipc::BroadPhase fresh(mode);
+  CHECK(said_by([&] { n_ee(fresh); }) == nothing && said_by([&] { n_fv(fresh); }) == nothing);
+  ours.clear();
+  CHECK(said_by([&] { n_ef(ours); }) == nothing && said_by([&] { n_vv(ours); }) == nothing);
   Eigen::MatrixXd bad = of.start;
   bad(5, 1) = std::numeric_limits<double>::quiet_NaN();
   ours.build(of.start, of.edges, of.faces, 0.05);
   CHECK(n_ee(ours) > 0);
-  CHECK(refuses([&] { ours.build(bad, of.edges, of.faces, 0.05); }) && n_ee(ours) == 0);
-  CHECK(refuses([&] { ours.build(of.start, bad, of.edges, of.faces, 0.05); }) && n_ee(ours) == 0);
+  CHECK(refuses([&] { ours.build(bad, of.edges, of.faces, 0.05); }) && said_by([&] { n_ee(ours); }) == nothing);
+  CHECK(refuses([&] { ours.build(of.start, bad, of.edges, of.faces, 0.05); }) && said_by([&] { n_ev(ours); }) == nothing);
 
   // Elements whose vertices are not there.
   for (const int vertex : {-1, static_cast<int>(of.start.rows()), 1 << 30}) {
@@ -353,5 +394,6 @@ int main() {
     vertices_of_edges(mode);
   }
   refusals();
+  cancelled();
   return finish("ipc");
 }

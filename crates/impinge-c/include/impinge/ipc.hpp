@@ -58,6 +58,13 @@ template <class... Part> [[noreturn]] void refuse(const Part &...parts) {
   impinge::detail::refuse(message.str().c_str());
 }
 
+/// The share of its distance that a pair keeps.
+inline double share_kept(double conservative_rescaling) {
+  if (!(conservative_rescaling > 0 && conservative_rescaling <= 1))
+    refuse("conservative_rescaling: ", conservative_rescaling, " given, above 0 and at most 1 allowed");
+  return 1 - conservative_rescaling;
+}
+
 /// Refuses positions that are not those of `n` vertices, or not finite.
 inline void check_positions(const char *name, Eigen::Ref<const Eigen::MatrixXd> at, Eigen::Index n) {
   if (at.rows() != n || at.cols() != 3) refuse(name, ": shape (", n, ", 3) expected, as the mesh has, (", at.rows(), ", ", at.cols(), ") given");
@@ -354,12 +361,14 @@ inline double compute_collision_free_stepsize(const ::ipc::CollisionMesh &mesh, 
   of.place(vertices_t0, vertices_t1);
   detail::step_filter filter(of, mesh.can_collide);
   // With all of its distance to lose, a pair still keeps what rounding moves.
-  const double share = std::max(1 - conservative_rescaling, 1e-9);
+  const double share = std::max(detail::share_kept(conservative_rescaling), 1e-9);
   const auto step = query::all().separation(min_distance).clearance(default_clearance, share).passes(detail::step_filter::passes, &filter);
   double fraction = 0;
   try {
     fraction = of.detector().advance_fraction(of.scene(), step);
-  } catch (const error &) {
+  } catch (const error &failed) {
+    // Only what is refused may be a seam. There may be no memory, or the question was cancelled.
+    if (failed.status() != IMPINGE_ERROR_INVALID) throw;
     // Parts that have come to touch at a vertex are no seam of the mesh: there is no step, as for all that touches.
     if (!of.detector().is_free(of.scene(), step)) {
       if (weld(mesh.rest_positions()).firsts.size() == mesh.num_vertices()) return 0;
@@ -373,6 +382,7 @@ inline double compute_collision_free_stepsize(const ::ipc::CollisionMesh &mesh, 
 
 /// Finds the pairs that ipc-toolkit asks for. In two dimensions ipc-toolkit's own default does. Without a `reuse_margin` of the caller's, near
 /// pairs are listed with one of a quarter of their distance. Several threads may ask for candidates of one object at once, in three dimensions.
+/// Before `build`, after `clear` and after a `build` that failed there are no candidates to ask for: that throws.
 class BroadPhase : public ::ipc::BroadPhase {
 public:
   explicit BroadPhase(ipc::mode of = mode::exact, settings how = backend::cpu) : mode_(of), known_(std::move(how)) {}
@@ -450,8 +460,9 @@ public:
 private:
   template <class Build> void flat_with(Build build) {
     clear();
-    flat_ = ::ipc::make_default_broad_phase();
-    build(*flat_);
+    auto flat = ::ipc::make_default_broad_phase();
+    build(*flat);
+    flat_ = std::move(flat);
     dim = 2;
   }
   const ::ipc::BroadPhase &flat() const {
@@ -484,7 +495,8 @@ private:
 
   /// Hands out the pairs of one kind that share no vertex and pass the filter.
   template <class Found> void each(pair_kind kind, int part_a, int part_b, Found found) const {
-    if (bodies_ == nullptr) return;
+    // No pairs would say that nothing is near.
+    if (bodies_ == nullptr) detail::refuse("BroadPhase: nothing is built: build it first, also after clear() and after a build that failed");
     const bool is_of_step = kind == pair_kind::vf || kind == pair_kind::ee || (!bodies_->has_faces() && kind != pair_kind::ef && kind != pair_kind::ff);
     // Edges and faces, and faces and faces, are near where others are: their boxes are all that is asked for.
     const bool asks_boxes = mode_ == mode::boxes || are_boxes_ || !is_of_step, tests_boxes = !asks_boxes && !is_still_;
@@ -569,7 +581,7 @@ private:
   template <class V> static point wide(const V &p) { return {p(0), p(1), p.size() > 2 ? p(2) : 0}; }
   template <std::size_t n>
   bool ask(pair_kind kind, const std::array<point, n> &from, const std::array<point, n> &to, double &toi, double min_distance, double tmax) const {
-    const auto raw = query::all().separation(min_distance).clearance(default_clearance, std::max(1 - conservative_rescaling, 0.0)).raw();
+    const auto raw = query::all().separation(min_distance).clearance(default_clearance, ipc::detail::share_kept(conservative_rescaling)).raw();
     double time = 0;
     std::int32_t found = 0;
     impinge::detail::give(
