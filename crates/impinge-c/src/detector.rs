@@ -1,11 +1,15 @@
 //! Detectors: `impinge_detector_*`, their settings, and the callbacks that questions call.
 
 use std::ffi::{CStr, CString, c_void};
+#[cfg(feature = "test-panic")]
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::ThreadId;
 use std::time::{Duration, Instant};
 
 use impinge::{Backend, CancelToken, Control, Detector, Error, Method, Progress, Settings};
+#[cfg(feature = "test-panic")]
+use impinge::{PairFilter, Query};
 
 use crate::scene::{Bodies, impinge_scene};
 use crate::sized::read_sized;
@@ -301,6 +305,37 @@ pub unsafe extern "C" fn impinge_detector_start_intersects(
 /// An answer that may not have been asked for: 1, 0 or -1.
 pub fn asked(answer: Option<bool>) -> i32 {
     answer.map_or(-1, i32::from)
+}
+
+/// Panics on a helper of the detector, for tests of the guard: in a step of the scene, where all
+/// threads are asked which pairs may collide.
+#[cfg(feature = "test-panic")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_test_helper_panic(
+    detector: *mut impinge_detector,
+    scene: *const impinge_scene,
+) -> Status {
+    let caller = std::thread::current().id();
+    let deadline = Instant::now() + Duration::from_secs(60);
+    let has_helper = Arc::new(AtomicBool::new(false));
+    let filter = PairFilter::new(move |_| {
+        if std::thread::current().id() != caller {
+            has_helper.store(true, Ordering::Relaxed);
+            panic!("as a test asked of a helper");
+        }
+        while !has_helper.load(Ordering::Relaxed) && Instant::now() < deadline {
+            std::thread::yield_now();
+        }
+        true
+    });
+    let query = Query::all().filter(filter);
+    // SAFETY: see `impinge_settings_default`.
+    unsafe {
+        ask(detector, scene, |detector, scene| {
+            detector.impacts(&scene.scene, &query)?;
+            Ok(())
+        })
+    }
 }
 
 /// Panics, for tests of the guard.

@@ -4,10 +4,10 @@
 use std::any::Any;
 use std::cell::{Cell, RefCell, UnsafeCell};
 use std::ffi::{CString, c_char};
-use std::ops::Deref;
+use std::ops::{Deref, DerefMut};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Once;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::{Mutex, Once, PoisonError};
 
 use impinge::Error;
 
@@ -82,10 +82,16 @@ impl From<Error> for Failure {
 thread_local! {
     static MESSAGE: RefCell<CString> = RefCell::default();
     /// How many guards this thread is in.
-    static GUARDS: Cell<u32> = const { Cell::new(0) };
-    /// Where the last panic within a guard was.
+    static OWN_GUARDS: Cell<u32> = const { Cell::new(0) };
+    /// Where the last panic within a guard of this thread was.
     static PLACE: RefCell<String> = const { RefCell::new(String::new()) };
 }
+
+/// How many guards all threads are in.
+static GUARDS: AtomicUsize = AtomicUsize::new(0);
+/// Where the last panic of a thread without a guard was, as a helper is: the thread that it helps
+/// passes the panic on.
+static PLACE_OF_HELPER: Mutex<String> = Mutex::new(String::new());
 
 /// Keeps a message for `impinge_error_message`.
 pub fn remember(message: &str) {
@@ -99,19 +105,38 @@ pub extern "C" fn impinge_error_message() -> *const c_char {
     MESSAGE.with(|held| held.borrow().as_ptr())
 }
 
-/// A panic within a guard prints nothing: its message becomes that of the call.
-fn watch_panics() {
+/// A panic within a guard, or of a thread that helps one, prints nothing: its message becomes that
+/// of the call.
+fn watch() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
-            if GUARDS.with(Cell::get) == 0 {
-                return before(panic);
-            }
             let place = panic.location().map(ToString::to_string);
-            PLACE.with(|held| *held.borrow_mut() = place.unwrap_or_default());
+            let place = place.unwrap_or_default();
+            if OWN_GUARDS.with(Cell::get) > 0 {
+                PLACE.with(|held| *held.borrow_mut() = place);
+            } else if GUARDS.load(Ordering::Relaxed) > 0 && may_help() {
+                *place_of_helper() = place;
+            } else {
+                before(panic);
+            }
         }));
     });
+}
+
+/// Whether this thread may be one of the library's: those of detectors have names that begin so,
+/// and those of rayon's pool of the process have none.
+fn may_help() -> bool {
+    let thread = std::thread::current();
+    thread
+        .name()
+        .is_none_or(|name| name.starts_with("impinge-"))
+}
+
+fn place_of_helper() -> impl DerefMut<Target = String> {
+    let place = PLACE_OF_HELPER.lock();
+    place.unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Runs an entry of the library. A failure, or a panic, becomes a status and the thread's message.
@@ -133,10 +158,12 @@ pub fn answer(result: Result<(), Failure>) -> Status {
 
 /// What an entry gives, or that it has panicked: `Err` says so, and nothing else does.
 fn catch<T>(entry: impl FnOnce() -> T) -> Result<T, Failure> {
-    watch_panics();
-    GUARDS.with(|n| n.set(n.get() + 1));
+    watch();
+    GUARDS.fetch_add(1, Ordering::Relaxed);
+    OWN_GUARDS.with(|n| n.set(n.get() + 1));
     let result = catch_unwind(AssertUnwindSafe(entry));
-    GUARDS.with(|n| n.set(n.get() - 1));
+    OWN_GUARDS.with(|n| n.set(n.get() - 1));
+    GUARDS.fetch_sub(1, Ordering::Relaxed);
     result.map_err(|panic| Failure {
         status: INTERNAL,
         message: describe(&*panic),
@@ -149,7 +176,11 @@ fn describe(panic: &(dyn Any + Send)) -> String {
         (_, Some(what)) => what.as_str(),
         _ => "a panic",
     };
-    let place = PLACE.with(|held| std::mem::take(&mut *held.borrow_mut()));
+    let mut place = PLACE.with(|held| std::mem::take(&mut *held.borrow_mut()));
+    if place.is_empty() {
+        // This thread passes on the panic of a helper.
+        place = std::mem::take(&mut *place_of_helper());
+    }
     format!("internal error, please report it: {what} ({place})")
 }
 
@@ -390,6 +421,22 @@ mod tests {
             "{message}"
         );
         assert_eq!(guard(|| Ok(())), OK);
+    }
+
+    #[test]
+    fn a_panic_of_a_helper_has_its_place() {
+        let help = || {
+            let helper = std::thread::spawn(|| panic!("on a helper"));
+            std::panic::resume_unwind(helper.join().expect_err("it panics"));
+        };
+        assert_eq!(guard(help), INTERNAL);
+        // SAFETY: as above.
+        let message = unsafe { CStr::from_ptr(impinge_error_message()) };
+        let message = message.to_str().expect("UTF-8");
+        assert!(
+            message.contains("on a helper (") && message.contains("status.rs"),
+            "{message}"
+        );
     }
 
     struct Number {

@@ -1,4 +1,8 @@
 /* Every question once, on two balls whose answers are known from geometry or from another question. */
+#ifdef TEST_PANIC
+#define _POSIX_C_SOURCE 200809L
+#include <unistd.h>
+#endif
 #include "common.h"
 
 static ball balls[2];
@@ -1191,6 +1195,7 @@ static void changes_by_callbacks(void) {
 #ifdef TEST_PANIC
 impinge_status impinge_test_panic(impinge_detector *detector);
 impinge_status impinge_test_scene_panic(impinge_scene *scene);
+impinge_status impinge_test_helper_panic(impinge_detector *detector, const impinge_scene *scene);
 #define BROKEN(call, text)                                                                                              \
   do {                                                                                                                  \
     CHECK((call) == IMPINGE_ERROR_INTERNAL);                                                                            \
@@ -1247,6 +1252,32 @@ static void broken_scene(void) {
   impinge_scene_destroy(bad);
   impinge_scene_destroy(good);
 }
+/* A panic of a helper thread prints nothing, and the message says where it was. */
+static void helper_panics(void) {
+  static ball end;
+  impinge_detector *detector = open_detector(2);
+  impinge_scene *scene = two_balls();
+  FILE *printed = tmpfile();
+  const int kept = dup(fileno(stderr));
+  impinge_status status;
+  long n_printed;
+  make_ball(&end, 0.5);
+  GOOD(impinge_scene_set_end_positions(scene, 1, positions_of(&end)));
+  fflush(stderr);
+  dup2(fileno(printed), fileno(stderr));
+  status = impinge_test_helper_panic(detector, scene);
+  fflush(stderr);
+  dup2(kept, fileno(stderr));
+  close(kept);
+  fseek(printed, 0, SEEK_END);
+  n_printed = ftell(printed);
+  fclose(printed);
+  CHECK(n_printed == 0);
+  CHECK(status == IMPINGE_ERROR_INTERNAL && strstr(impinge_error_message(), "as a test asked of a helper (") != NULL);
+  CHECK(strstr(impinge_error_message(), "detector.rs:") != NULL);
+  impinge_detector_destroy(detector);
+  impinge_scene_destroy(scene);
+}
 /* A defect breaks the handle, and nothing else. */
 static void panics(void) {
   impinge_detector *detector = open_detector(1), *other = open_detector(1);
@@ -1284,6 +1315,7 @@ int main(void) {
   changes_by_callbacks();
 #ifdef TEST_PANIC
   panics();
+  helper_panics();
   broken_detector();
   broken_scene();
 #endif
