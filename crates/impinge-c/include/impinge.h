@@ -19,7 +19,8 @@
  *   A scene or a detector must not be destroyed while another thread may call a function with it. Where a call is using it, as in a callback,
  *   its `_destroy` does nothing: impinge_error_message() says so, and it must be called again.
  * Units. Lengths are in the unit of the scene. Times are fractions of a step, from 0 to 1.
- * The library prints nothing, reads no environment variables, and installs no signal handlers.
+ * The library prints nothing and installs no signal handlers. It reads no environment variables, but Rust's standard library reads
+ *   RUST_MIN_STACK, the bytes of a thread's stack, where it starts the first one, and drivers of GPUs read theirs.
  */
 #ifndef IMPINGE_H
 #define IMPINGE_H

@@ -106,10 +106,11 @@ pub extern "C" fn impinge_error_message() -> *const c_char {
 }
 
 /// A panic within a guard, or of a thread that helps one, prints nothing: its message becomes that
-/// of the call.
+/// of the call. The first guard also says that nobody else uses the rayon pool of the process.
 fn watch() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
+        impinge::own_pool();
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
             let place = panic.location().map(ToString::to_string);

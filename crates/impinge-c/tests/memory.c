@@ -1,4 +1,4 @@
-/* What is lent is not copied, and what cannot be had is an error. Linked with --wrap for malloc and the like, so that all of the library's allocations are seen. */
+/* What is lent is not copied, what cannot be had is an error, and the environment is not read. Linked with --wrap for malloc and the like, so that all of the library's allocations are seen. */
 #include "common.h"
 
 void *__real_malloc(size_t size);
@@ -16,6 +16,17 @@ void *__wrap_calloc(size_t n, size_t size) { return refuse(n * size) ? NULL : __
 void *__wrap_realloc(void *at, size_t size) { return refuse(size) ? NULL : __real_realloc(at, size); }
 int __wrap_posix_memalign(void **at, size_t alignment, size_t size) {
   return refuse(size) ? 12 : __real_posix_memalign(at, alignment, size);
+}
+
+/* What the library reads of the environment, but the size of stacks, which Rust's standard library reads. */
+char *__real_getenv(const char *name);
+static int n_read = 0;
+char *__wrap_getenv(const char *name) {
+  if (strcmp(name, "RUST_MIN_STACK") != 0) {
+    fprintf(stderr, "it reads %s\n", name);
+    ++n_read;
+  }
+  return __real_getenv(name);
 }
 
 static int n_released = 0;
@@ -174,6 +185,17 @@ int main(void) {
     impinge_near_destroy(near_pairs);
     impinge_pairs_destroy(old);
     impinge_pairs_destroy(pairs);
+  }
+  {
+    /* As many threads as there are cores, also of the pool that matrices are shared by. */
+    static double matrices[4096][3][3];
+    impinge_detector *many = open_detector(0);
+    CHECK(hash_of(many, scene, NULL) == hash);
+    for (i = 0; i < 4096; ++i) matrices[i][0][0] = matrices[i][1][1] = matrices[i][2][2] = i % 2 ? -1 : 1;
+    GOOD(impinge_project_psd(&matrices[0][0][0], 4096, 3));
+    CHECK(matrices[1][0][0] == 0 && matrices[2][0][0] == 1);
+    CHECK(n_read == 0);
+    impinge_detector_destroy(many);
   }
   impinge_scene_destroy(scene);
   impinge_detector_destroy(detector);

@@ -69,4 +69,6 @@ pub use search::stats::{Stage, Stats};
 #[cfg(feature = "gpu")]
 pub use wgpu;
 pub use workers::affinity::Affinity;
+#[doc(hidden)]
+pub use workers::own_pool;
 pub use workers::tuning::{Tuning, Ways};

@@ -158,7 +158,7 @@ pub use impinge_core::{
     devices, devices_async,
 };
 #[doc(hidden)]
-pub use impinge_core::{StartOfBody, StepStart};
+pub use impinge_core::{StartOfBody, StepStart, own_pool};
 pub use impinge_core::{contact, exact, proximity};
 
 // The types that users hold are `Send` and `Sync`.

@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 use super::alone::is_alone;
-use super::is_forked;
+use super::{is_forked, n_at_hand};
 
 /// Gives all items to `work`, in parts of at most `size` with the number of the first, on at most
 /// so many threads of the rayon pool at hand; 0 for all of its threads. Few items, and all of them
@@ -23,7 +23,7 @@ pub(crate) fn in_parts<T: Send>(
     if is_alone() || threads == 1 || items.len() <= size || is_forked() {
         return work(0, items);
     }
-    let n_threads = match (threads, rayon::current_num_threads()) {
+    let n_threads = match (threads, n_at_hand()) {
         (0, all) => all,
         (some, all) => some.min(all),
     };

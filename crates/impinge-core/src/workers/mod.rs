@@ -24,7 +24,7 @@ pub(crate) mod tuning;
 use crate::scene::words::debug_by_name;
 use crate::workers::clock::Instant;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, Once, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -115,8 +115,8 @@ impl Workers {
         let (pool, n) = match threads {
             // One thread, without what a pool needs.
             0 if cfg!(target_family = "wasm") => (OnceLock::new(), 1),
-            0 if is_forked() => (OnceLock::new(), rayon::current_num_threads()),
-            0 => (Pool::OfProcess.into(), rayon::current_num_threads()),
+            0 if is_forked() => (OnceLock::new(), n_at_hand()),
+            0 => (Pool::OfProcess.into(), n_at_hand()),
             n => (OnceLock::new(), n),
         };
         Workers {
@@ -388,6 +388,31 @@ pub fn is_forked() -> bool {
     let this = process();
     let first = FIRST.compare_exchange(0, this, Ordering::Relaxed, Ordering::Relaxed);
     first.is_err_and(|first| first != this)
+}
+
+/// Whether the rayon pool of the process is this library's alone.
+static OWNS_POOL: AtomicBool = AtomicBool::new(false);
+
+/// Says that nobody else uses the rayon pool of the process, as in a library for C. Where it is
+/// first needed, it then gets one thread per core, whatever the environment says.
+#[doc(hidden)]
+pub fn own_pool() {
+    OWNS_POOL.store(true, Ordering::Relaxed);
+}
+
+/// The number of threads of the rayon pool at hand. Outside of all others that is the pool of the
+/// process, which is started then.
+pub(crate) fn n_at_hand() -> usize {
+    static SIZED: Once = Once::new();
+    if OWNS_POOL.load(Ordering::Relaxed) && rayon::current_thread_index().is_none() {
+        SIZED.call_once(|| {
+            let n = thread::available_parallelism().map_or(1, usize::from);
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n);
+            // Without its threads rayon says so, as without this call.
+            let _ = pool.build_global();
+        });
+    }
+    rayon::current_num_threads()
 }
 
 fn build_pool(n_threads: usize) -> Result<rayon::ThreadPool, Error> {
