@@ -43,11 +43,11 @@ impl impinge_contacts {
     fn new(contacts: Contacts, hash: u64, stats: Stats) -> Result<Self, Failure> {
         let rows = contacts.rows().iter().map(|&row| row.into());
         let shapes = contacts.shapes().iter().map(|shape| match shape {
-            Shape::Solid => 0,
-            Shape::Apart => 1,
-            Shape::Point => 2,
-            Shape::Segment => 3,
-            Shape::Polygon => 4,
+            Shape::Solid => SHAPE_SOLID,
+            Shape::Apart => SHAPE_EMPTY,
+            Shape::Point => SHAPE_POINT,
+            Shape::Segment => SHAPE_SEGMENT,
+            Shape::Polygon => SHAPE_POLYGON,
         });
         Ok(impinge_contacts {
             rows: collect(rows, "contacts")?,

@@ -171,9 +171,9 @@ unsafe fn settings(given: &impinge_settings) -> Result<Settings, Failure> {
         )))
     };
     let backend = match given.backend {
-        0 if cfg!(feature = "gpu") => Backend::Auto,
-        0 | 1 => Backend::Cpu,
-        2 => Backend::Gpu,
+        BACKEND_AUTO if cfg!(feature = "gpu") => Backend::Auto,
+        BACKEND_AUTO | BACKEND_CPU => Backend::Cpu,
+        BACKEND_GPU => Backend::Gpu,
         other => return out_of_range("backend", other, "IMPINGE_BACKEND_GPU"),
     };
     let Some(&method) = Method::ALL.get(given.method as usize) else {
@@ -206,7 +206,7 @@ fn place(of: &Detector, given: &impinge_settings) -> String {
         return format!("on the GPU {name}");
     }
     let why = match (given.backend, Method::ALL.get(given.method as usize)) {
-        (1, _) => return "on the CPU".into(),
+        (BACKEND_CPU, _) => return "on the CPU".into(),
         (_, Some(Method::Naive)) => "no GPU is looked for with IMPINGE_METHOD_NAIVE",
         _ if of.waits_for_gpu() => "a GPU is looked for when one first pays",
         _ => "no GPU could be opened",
@@ -220,7 +220,7 @@ fn place(of: &Detector, given: &impinge_settings) -> String {
 fn place(_: &Detector, given: &impinge_settings) -> String {
     const WHY: &str = "on the CPU: this library was built without the GPU backend";
     match (given.backend, given.device.is_null()) {
-        (1, _) => "on the CPU".into(),
+        (BACKEND_CPU, _) => "on the CPU".into(),
         (_, true) => WHY.into(),
         (_, false) => {
             // SAFETY: `impinge.h` says that it is a C string.

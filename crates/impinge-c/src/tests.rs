@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::Command;
 use std::ptr::{null, null_mut};
 
-use impinge::{Backend, Detector, Elements, PairKind, Positions, Query, Scene};
+use impinge::{Backend, Detector, Elements, Method, PairKind, Positions, Query, Scene};
 use impinge_scenes::{BuiltScene, Model, adversarial, soup, surfaces};
 
 use crate::answers::*;
@@ -77,6 +77,9 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         TRIANGLES,
         TETRAHEDRA,
         ANY_BODY,
+        BACKEND_AUTO,
+        BACKEND_CPU,
+        BACKEND_GPU,
         SKIP,
         RESOLVE,
         START_REPORT,
@@ -84,6 +87,7 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         START_VERIFY,
         DISTANCES,
         CLOSEST_POINTS,
+        SIGNED,
         CELL,
         HITS_FIRST,
         HITS_ANY,
@@ -92,8 +96,14 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         EXCLUDE_RINGS,
         EXCLUDE_GROUPS,
         EXCLUDE_VERTICES,
+        SHAPE_SOLID,
+        SHAPE_EMPTY,
+        SHAPE_POINT,
+        SHAPE_SEGMENT,
+        SHAPE_POLYGON,
         NO_FEATURE,
         NO_ELEMENT,
+        ON_SURFACE,
         LOG_ERROR,
         LOG_INFO,
         COLUMN_KIND,
@@ -134,6 +144,10 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
     for kind in PairKind::ALL {
         layout.insert(kind.name().to_uppercase(), bit(kind) as usize);
     }
+    // A method has its place in the list as its number.
+    for (ix, method) in Method::ALL.into_iter().enumerate() {
+        layout.insert(format!("METHOD_{}", method.name().to_uppercase()), ix);
+    }
     layout
 }
 
@@ -172,6 +186,15 @@ fn layouts_are_those_of_the_header() {
     let expected = layout_in_rust();
     assert!(expected.len() > 150);
     assert_eq!(layout_in("cc", "c"), expected);
+    // Every constant of the header is among them.
+    let header = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/impinge.h");
+    let header = std::fs::read_to_string(header).expect("the header");
+    let names = header.lines().filter_map(|line| {
+        let (name, value) = line.strip_prefix("#define IMPINGE_")?.split_once(' ')?;
+        (!value.is_empty()).then(|| name.strip_prefix("ERROR_").unwrap_or(name))
+    });
+    let missing: Vec<_> = names.filter(|&name| !expected.contains_key(name)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
 }
 
 /// A scene built through C.

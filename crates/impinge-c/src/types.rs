@@ -35,6 +35,10 @@ pub const TETRAHEDRA: u32 = 4;
 
 pub const ANY_BODY: u32 = u32::MAX;
 
+pub const BACKEND_AUTO: u32 = 0;
+pub const BACKEND_CPU: u32 = 1;
+pub const BACKEND_GPU: u32 = 2;
+
 pub const SKIP: u32 = 0;
 pub const RESOLVE: u32 = 1;
 
@@ -44,6 +48,9 @@ pub const START_VERIFY: u32 = 2;
 
 pub const DISTANCES: u32 = 1;
 pub const CLOSEST_POINTS: u32 = 2;
+/// Refused: `impinge_signed_distance` has signs.
+#[cfg_attr(not(test), expect(dead_code, reason = "a flag of the header alone"))]
+pub const SIGNED: u32 = 4;
 pub const CELL: u32 = 8;
 
 pub const HITS_FIRST: u32 = 0;
@@ -92,6 +99,12 @@ pub const COLUMN_MOLLIFIER_HESSIAN: u32 = 31;
 pub const COLUMN_KEPT: u32 = 32;
 pub const COLUMN_NEW: u32 = 33;
 pub const COLUMN_GONE: u32 = 34;
+
+pub const SHAPE_SOLID: u8 = 0;
+pub const SHAPE_EMPTY: u8 = 1;
+pub const SHAPE_POINT: u8 = 2;
+pub const SHAPE_SEGMENT: u8 = 3;
+pub const SHAPE_POLYGON: u8 = 4;
 
 pub const NO_FEATURE: u32 = 255;
 /// No element.
