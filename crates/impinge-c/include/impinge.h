@@ -957,6 +957,9 @@ int32_t impinge_motion_start_intersects(const impinge_motion *motion);
 uint64_t impinge_motion_n_cut(const impinge_motion *motion);
 uint64_t impinge_motion_n_touching(const impinge_motion *motion);
 uint32_t impinge_motion_rounds(const impinge_motion *motion);
+/* Of impinge_truncate: the pairs that stopped vertices, those that touch at the start included, sorted by kind, then by row. They belong to
+ * the caller, outlive the motion, and are sorted anew by each call; their stats are empty. INVALID: of impinge_advance. */
+impinge_status impinge_motion_pairs(const impinge_motion *motion, impinge_candidates **pairs);
 /* Where the vertices of a body are then: a view, valid as long as the motion. No rows for a body that stands still. INVALID: no such body
  * when the step was asked about. */
 impinge_status impinge_motion_positions(const impinge_motion *motion, uint32_t body, impinge_array *view);

@@ -2,12 +2,12 @@
 
 use impinge::{Advance, Positions, Scene, Stats, Truncation};
 
-use crate::answers::impact_row;
+use crate::answers::{impact_row, impinge_candidates};
 use crate::arrays;
 use crate::detector::asked;
 use crate::scene::impinge_scene;
 use crate::stats::{Texts, fill};
-use crate::status::{Failure, change, destroy, guard, held, put};
+use crate::status::{Failure, change, clear, destroy, guard, held, put};
 use crate::types::*;
 
 /// Positions to which a step can be taken.
@@ -195,6 +195,24 @@ pub unsafe extern "C" fn impinge_motion_n_touching(motion: *const impinge_motion
 pub unsafe extern "C" fn impinge_motion_rounds(motion: *const impinge_motion) -> u32 {
     // SAFETY: `impinge.h` says what pointers are.
     unsafe { counted(motion, Truncation::rounds) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_motion_pairs(
+    motion: *const impinge_motion,
+    pairs: *mut *mut impinge_candidates,
+) -> Status {
+    guard(|| {
+        // SAFETY: `impinge.h` says what pointers are, in all calls.
+        unsafe {
+            clear(pairs, "pairs")?;
+            let truncation = held(motion, "motion")?.of.truncation().ok_or_else(|| {
+                Failure::invalid("motion: it is of impinge_advance, which stops no vertex alone")
+            })?;
+            let found = Box::new(impinge_candidates::new(truncation.pairs())?);
+            put(pairs, "pairs", Box::into_raw(found))
+        }
+    })
 }
 
 #[unsafe(no_mangle)]

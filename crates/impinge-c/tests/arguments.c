@@ -20,6 +20,7 @@ int main(void) {
   impinge_closest *closest = (impinge_closest *)detector;
   impinge_hits *hits = (impinge_hits *)detector;
   impinge_motion *motion = (impinge_motion *)detector;
+  impinge_candidates *candidates = NULL;
   impinge_nearest nearest;
   int8_t places[VERTICES];
   uint32_t tetrahedra[VERTICES] = {9};
@@ -356,6 +357,11 @@ int main(void) {
     impinge_motion_destroy(motion);
     GOOD(impinge_advance(detector, scene, NULL, NULL, &motion));
     REFUSED(impinge_motion_positions(motion, 77, &bad), "no body 77 among the 1");
+    candidates = (impinge_candidates *)scene;
+    REFUSED(impinge_motion_pairs(motion, &candidates), "impinge_advance");
+    CHECK(candidates == NULL);
+    REFUSED(impinge_motion_pairs(NULL, &candidates), "motion is NULL");
+    REFUSED(impinge_motion_pairs(motion, NULL), "pairs is NULL");
     impinge_motion_destroy(motion);
   }
   {

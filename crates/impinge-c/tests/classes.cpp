@@ -265,6 +265,8 @@ void probes() {
   const auto truncation = detector.truncate(scene);
   CHECK(truncation.n_cut() > 10 && truncation.n_touching() == 0 && truncation.rounds() > 0 && !truncation.start_intersects());
   CHECK(truncation.positions(b).rows == VERTICES && truncation.positions(a).rows == 0);
+  const auto stopped = truncation.pairs();
+  CHECK(stopped.size() > 10 && stopped.hash() != 0 && stopped.kinds().size() == stopped.size() && stopped.of(pair_kind::vf).size() > 0);
   const auto apart = detector.impacts(scene, query::between_all().separation(0.1)).size();
   scene.set_vertex_thickness(a, std::vector<double>(VERTICES, 0.0625));
   scene.set_thickness(b, 0.0375);

@@ -679,6 +679,7 @@ static void solvers(impinge_detector *detector) {
   impinge_neighbours *lists = NULL;
   impinge_near *near_pairs = NULL, *again = NULL;
   impinge_motion *motion = NULL;
+  impinge_candidates *candidates = NULL;
   impinge_nearest nearest;
   impinge_impact impact;
   impinge_array view, indices, distances;
@@ -861,6 +862,14 @@ static void solvers(impinge_detector *detector) {
   CHECK(impinge_motion_n_cut(motion) > 10 && impinge_motion_n_touching(motion) == 0 && impinge_motion_rounds(motion) > 0);
   CHECK(isnan(impinge_motion_fraction(motion)) && impinge_motion_start_intersects(motion) == -1);
   REFUSED(impinge_motion_first(motion, &impact, &found), "impinge_truncate");
+  GOOD(impinge_motion_pairs(motion, &candidates));
+  {
+    /* Only the second ball moves. */
+    const impinge_pair *rows = impinge_candidates_data(candidates);
+    CHECK(impinge_candidates_count(candidates) > 10 && impinge_candidates_hash(candidates) != 0);
+    for (i = 0; i < impinge_candidates_count(candidates); ++i) CHECK(rows[i].body_a == 1 || rows[i].body_b == 1);
+    impinge_candidates_destroy(candidates);
+  }
   GOOD(impinge_motion_positions(motion, 1, &view));
   {
     const double(*at)[3] = view.data;

@@ -95,6 +95,7 @@ OF_NAMED(neighbours, .fv());
 OF_NAMED(neighbours, .ee());
 OF_NAMED(neighbours, .stats());
 OF_NAMED(truncation, .positions(0));
+OF_ANY(truncation, .pairs());
 OF_NAMED(impinge::advance, .positions(0));
 OF_NAMED(impinge::advance, .stats());
 OF_ANY(impinge::advance, .fraction());

@@ -498,6 +498,12 @@ public:
   std::uint64_t n_touching() const noexcept { return impinge_motion_n_touching(raw()); }
   /// How often pairs were looked at again, because vertices had been stopped.
   std::uint32_t rounds() const noexcept { return impinge_motion_rounds(raw()); }
+  /// The pairs that stopped vertices, those that touch at the start included. Sorted anew by each call; their stats are empty.
+  result<candidates> pairs() const {
+    detail::made<impinge_candidates> made;
+    const auto status = impinge_motion_pairs(raw(), made.out());
+    return detail::give(status, candidates(made.take()));
+  }
 };
 
 } // namespace IMPINGE_MODE
