@@ -4,6 +4,7 @@
 #[cfg(feature = "gpu")]
 mod gpu;
 mod probe;
+mod queries;
 
 use std::collections::BTreeMap;
 use std::mem::offset_of;
@@ -195,6 +196,18 @@ fn layouts_are_those_of_the_header() {
     });
     let missing: Vec<_> = names.filter(|&name| !expected.contains_key(name)).collect();
     assert!(missing.is_empty(), "{missing:?}");
+}
+
+/// The rows of a packed view.
+///
+/// # Safety
+/// The view is one of ours, of rows of this type.
+unsafe fn numbers<T>(of: &impinge_array) -> &[T] {
+    match of.rows {
+        0 => &[],
+        // SAFETY: the caller's promise.
+        n => unsafe { std::slice::from_raw_parts(of.data.cast(), n) },
+    }
 }
 
 /// A scene built through C.

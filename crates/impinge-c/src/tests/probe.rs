@@ -1,19 +1,16 @@
-//! Questions about points and rays, and of penetration-free solvers: the answers through C are
-//! those of Rust.
+//! Questions about points and rays, and pairs that are left out: the answers through C are those of
+//! Rust.
 
 use std::ptr::{null, null_mut};
 
-use impinge::{Backend, Bounds, Csr, Detector, Exclusion, Hit, PairKind, Part, Query, Scene};
+use impinge::{Backend, Detector, Exclusion, Hit, Query, Scene};
 use impinge_scenes::solids::solid_ball;
 use impinge_scenes::{Random, surfaces};
 
-use super::{Built, catalogue, of_models, through_c};
-use crate::arrays::{no_rows, positions_view, view, view_of};
-use crate::motion::*;
-use crate::neighbours::*;
+use super::{Built, catalogue, numbers, of_models, through_c};
+use crate::arrays::{no_rows, view, view_of};
 use crate::probe::*;
 use crate::questions::*;
-use crate::safe::*;
 use crate::scene::*;
 use crate::types::*;
 
@@ -22,18 +19,6 @@ fn points(n: usize, seed: u64) -> Vec<[f64; 3]> {
     (0..n)
         .map(|_| [0; 3].map(|_: i32| f64::from(random.range(-1.5, 1.5))))
         .collect()
-}
-
-/// The numbers of a packed column of one number each.
-///
-/// # Safety
-/// The view is one of ours, of numbers of this type.
-unsafe fn numbers<T>(of: &impinge_array) -> &[T] {
-    match of.rows {
-        0 => &[],
-        // SAFETY: the caller's promise.
-        n => unsafe { std::slice::from_raw_parts(of.data.cast(), n) },
-    }
 }
 
 #[test]
@@ -181,121 +166,6 @@ fn points_and_rays_are_those_of_rust() {
         }
     }
     assert!(n_located > 3 && n_wound > 3, "{n_located} {n_wound}");
-}
-
-/// Compares the lists of one kind, seen from one side.
-///
-/// # Safety
-/// As in `through_c`.
-unsafe fn check_lists(of: *mut impinge_neighbours, kind: PairKind, reversed: u32, expected: &Csr) {
-    let [mut offsets, mut indices, mut distances] = [no_rows(U8); 3];
-    // SAFETY: the caller's promise.
-    unsafe {
-        let status = impinge_neighbours_lists(
-            of,
-            bit(kind),
-            reversed,
-            &mut offsets,
-            &mut indices,
-            &mut distances,
-        );
-        assert_eq!(status, OK);
-        assert_eq!(numbers::<u64>(&offsets), expected.offsets);
-        assert_eq!(numbers::<u32>(&indices), expected.indices);
-        assert_eq!(numbers::<f64>(&distances), expected.distances);
-    }
-}
-
-#[test]
-fn bounds_lists_and_truncations_are_those_of_rust() {
-    for (name, scene) in catalogue() {
-        let built = through_c(&scene);
-        let (on, of) = (built.detector, built.scene.cast_const());
-        let mut detector = Detector::new(Backend::Cpu).expect("the CPU");
-        let (fixed, _) = scene.bodies().next().expect("a body");
-        let number = fixed.index() as u32;
-        let query = impinge_query {
-            fixed: &raw const number,
-            n_fixed: 1,
-            ..impinge_query::default()
-        };
-        // SAFETY: as in `through_c`.
-        unsafe {
-            let mut safe = null_mut();
-            assert_eq!(
-                impinge_find_safe_distances(on, of, 0.02, &query, &mut safe),
-                OK
-            );
-            let expected = detector.safe_distances(&scene, 0.02, &Query::all().fixed([fixed]));
-            let expected = expected.expect("bounds");
-            for (id, _) in scene.bodies() {
-                let mut view = no_rows(U8);
-                let status = impinge_safe_distances_of(safe, id.index() as u32, &mut view);
-                assert_eq!(status, OK);
-                match expected.of(id).expect("a body") {
-                    Bounds::F32(bounds) => assert_eq!(numbers::<f32>(&view), bounds, "{name}"),
-                    Bounds::F64(bounds) => assert_eq!(numbers::<f64>(&view), bounds, "{name}"),
-                }
-            }
-            let touching = impinge_safe_distances_touching(safe);
-            let hash = crate::answers::impinge_near_hash(touching);
-            assert_eq!(hash, expected.touching().hash(), "{name}");
-            impinge_safe_distances_destroy(safe);
-
-            let mut near = null_mut();
-            assert_eq!(impinge_find_neighbours(on, of, 0.02, null(), &mut near), OK);
-            let expected = detector.neighbours(&scene, 0.02, &Query::all());
-            let expected = expected.expect("lists");
-            assert_eq!(impinge_neighbours_count(near), expected.len());
-            for kind in PairKind::ALL {
-                check_lists(near, kind, 0, expected.of(kind));
-                check_lists(near, kind, 1, expected.reversed(kind));
-            }
-            for (id, _) in scene.bodies() {
-                let mut first = [0; 3];
-                let status = impinge_neighbours_first(near, id.index() as u32, &mut first);
-                let parts = [Part::Vertices, Part::Edges, Part::Faces];
-                let own = parts.map(|part| expected.first(id, part).expect("a body"));
-                assert_eq!((status, first), (OK, own));
-            }
-            impinge_neighbours_destroy(near);
-
-            let mut motion = null_mut();
-            let status = impinge_truncate(on, of, null(), &mut motion);
-            match detector.truncate(&scene, &Query::all()) {
-                Err(_) => assert_eq!(status, INVALID, "{name}"),
-                Ok(expected) => {
-                    assert_eq!(status, OK, "{name}");
-                    let counts = (
-                        impinge_motion_n_cut(motion),
-                        impinge_motion_n_touching(motion),
-                        impinge_motion_rounds(motion),
-                    );
-                    let own = (expected.n_cut(), expected.n_touching(), expected.rounds());
-                    assert_eq!(counts, own, "{name}");
-                    assert!(impinge_motion_fraction(motion).is_nan());
-                    let (mut impact, mut found) = (std::mem::zeroed(), -1);
-                    let status = impinge_motion_first(motion, &mut impact, &mut found);
-                    assert_eq!((status, found), (INVALID, -1));
-                    for (id, _) in scene.bodies() {
-                        let mut view = no_rows(U8);
-                        let body = id.index() as u32;
-                        assert_eq!(impinge_motion_positions(motion, body, &mut view), OK);
-                        let own = expected.positions(id).map(positions_view);
-                        assert_eq!(view.rows, own.map_or(0, |own| own.rows));
-                        let Some(own) = own else { continue };
-                        let size = if own.r#type == F32 { 12 } else { 24 };
-                        let bytes = |of: &impinge_array| {
-                            std::slice::from_raw_parts(of.data.cast::<u8>(), of.rows * size)
-                        };
-                        assert_eq!(bytes(&view), bytes(&own), "{name}");
-                    }
-                    assert_eq!(impinge_motion_apply(motion, built.scene), OK);
-                }
-            }
-            impinge_motion_destroy(motion);
-        }
-    }
 }
 
 /// The hash of the near pairs that a query leaves.
