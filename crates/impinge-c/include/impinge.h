@@ -176,7 +176,15 @@ impinge_status impinge_scene_lend_end_positions(impinge_scene *scene, uint32_t b
 impinge_status impinge_scene_set_transform(impinge_scene *scene, uint32_t body, impinge_array matrix);
 
 /* Sets where the vertices are at the end of the step by an affine matrix, which moves the positions given last, those that
- * impinge_scene_set_transform moves too, and is rounded as there. Each vertex moves on a straight line to its end. INVALID: as there. */
+ * impinge_scene_set_transform moves too, and is rounded as there. The matrices of the two ends of a step both start from these positions,
+ * neither from the other.
+ * Each vertex goes straight, at constant speed, from its rounded position to its rounded end, not along the arc of a turn; what is proven
+ * of a step is proven of this motion. Halfway through a turn the body is smaller, by a factor of the cosine of half the angle; half a turn
+ * takes it through its axis. At each moment, a point at distance r from the axis of a screw motion by the angle w (radians) is at most
+ * r w^2 / 8 away from where that motion would have it, plus the rounding of the two ends. So cut a large turn into n equal steps,
+ * n = ceil(w * sqrt(r / (8 * d))), where r is that of the farthest vertex and d the deviation that is allowed. With a separation of 2 d, d of
+ * each of two bodies, a step that is free is free for the screw motion too, up to that rounding.
+ * INVALID: as impinge_scene_set_transform; the body keeps its end positions then. */
 impinge_status impinge_scene_set_end_transform(impinge_scene *scene, uint32_t body, impinge_array matrix);
 
 /* Sets whom a body meets in queries that name no two bodies: two bodies meet if the category of each shares a bit with the mask of the
