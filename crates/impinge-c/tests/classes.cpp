@@ -48,6 +48,13 @@ void answers() {
   }
   CHECK(detector.count(scene, query::between(a, b)) == kept.size() && detector.any(scene));
   CHECK(!detector.any(scene, query::all().exclude(a, b)) && !detector.any(scene, query::self_all()));
+  {
+    // A reference keeps what setters of a temporary give.
+    const auto &without = query::all().separation(0.25).exclude(a, b);
+    const auto &one = impinge::settings(impinge::backend::cpu).threads(1).reuse_margin(0.5);
+    CHECK(without.raw().separation == 0.25 && !detector.any(scene, without));
+    CHECK(one.reuse_margin() == 0.5 && impinge::detector(one).any(scene));
+  }
 #if __cplusplus >= 202002L
   std::span<const impinge::pair> span = kept.rows();
   CHECK(span.size() == kept.size());

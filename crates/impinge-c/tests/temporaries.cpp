@@ -107,6 +107,40 @@ OF_NAMED(scene, .edges(0));
 OF_NAMED(scene, .faces(0));
 OF_NAMED(detector, .stats());
 
+// Setters of a temporary give a value, which a reference to it keeps, and those of one with a name that one.
+#define SETTER(type, call)                                                                                                            \
+  static_assert(std::is_same_v<decltype(std::declval<type>() call), type>, #type #call " of a temporary");                            \
+  static_assert(std::is_same_v<decltype(std::declval<type &>() call), type &>, #type #call " of one with a name")
+SETTER(query, .kinds({kind}));
+SETTER(query, .shared_vertex(shared_vertex::skip));
+SETTER(query, .exclude(0, 1));
+SETTER(query, .exclude(std::declval<const near_pairs &>()));
+SETTER(query, .exclude_rings(1));
+SETTER(query, .exclude_groups(0, 1));
+SETTER(query, .exclude_vertices(0, 1, std::declval<std::vector<int> &>(), std::declval<const std::vector<int> &>()));
+SETTER(query, .fixed({0}));
+SETTER(query, .n_nearest(2));
+SETTER(query, .hits(hits_of_ray::all));
+SETTER(query, .owned_by({0, 0, 0}, {1, 1, 1}));
+SETTER(query, .start(start::skip));
+SETTER(query, .precision(precision::f64));
+SETTER(query, .separation(1));
+SETTER(query, .clearance(1));
+SETTER(query, .clearance(1, 0.5));
+SETTER(query, .distances());
+SETTER(query, .closest_points());
+SETTER(query, .passes(nullptr, nullptr));
+SETTER(settings, .backend(backend::cpu));
+SETTER(settings, .method(method::cells));
+SETTER(settings, .threads(1));
+SETTER(settings, .memory_budget(1));
+SETTER(settings, .max_pairs(1));
+SETTER(settings, .reuse_margin(1));
+SETTER(settings, .device("none"));
+SETTER(settings, .cancelled(nullptr));
+SETTER(settings, .progress(nullptr));
+SETTER(settings, .log(nullptr));
+
 #ifdef IMPINGE_NO_EXCEPTIONS
 OF_NAMED(result<pairs>, .operator->());
 static_assert(std::is_same_v<decltype(*std::declval<result<pairs>>()), pairs>, "a temporary gives its value away");

@@ -31,20 +31,32 @@ class settings {
 public:
   settings() { impinge_settings_default(&raw_); }
   settings(impinge::backend of) : settings() { backend(of); }
-  settings &backend(impinge::backend of) { return set(raw_.backend, static_cast<std::uint32_t>(of)); }
-  settings &method(impinge::method of) { return set(raw_.method, static_cast<std::uint32_t>(of)); }
+  settings &backend(impinge::backend of) & { return set(raw_.backend, static_cast<std::uint32_t>(of)); }
+  settings &method(impinge::method of) & { return set(raw_.method, static_cast<std::uint32_t>(of)); }
   /// Threads of the CPU; 0 for one per core.
-  settings &threads(std::uint32_t n) { return set(raw_.threads, n); }
-  settings &memory_budget(std::uint64_t bytes) { return set(raw_.memory_budget, bytes); }
-  settings &max_pairs(std::uint64_t n) { return set(raw_.max_pairs, n); }
+  settings &threads(std::uint32_t n) & { return set(raw_.threads, n); }
+  settings &memory_budget(std::uint64_t bytes) & { return set(raw_.memory_budget, bytes); }
+  settings &max_pairs(std::uint64_t n) & { return set(raw_.max_pairs, n); }
   /// Near pairs are listed with this margin, and only those looked at while no vertex has moved farther than half of it; 0 for no lists.
-  settings &reuse_margin(double length) { return set(raw_.reuse_margin, length); }
+  settings &reuse_margin(double length) & { return set(raw_.reuse_margin, length); }
   double reuse_margin() const { return raw_.reuse_margin; }
-  settings &device(std::string name) { return set(device_, std::move(name)); }
+  settings &device(std::string name) & { return set(device_, std::move(name)); }
   /// Stops a question when it gives true. What a callback throws stops the question too, and comes out of it.
-  settings &cancelled(std::function<bool()> call) { return set(cancelled_, std::move(call)); }
-  settings &progress(std::function<void(std::uint64_t done, std::uint64_t total)> call) { return set(progress_, std::move(call)); }
-  settings &log(std::function<void(std::uint32_t level, const char *message)> call) { return set(log_, std::move(call)); }
+  settings &cancelled(std::function<bool()> call) & { return set(cancelled_, std::move(call)); }
+  settings &progress(std::function<void(std::uint64_t done, std::uint64_t total)> call) & { return set(progress_, std::move(call)); }
+  settings &log(std::function<void(std::uint32_t level, const char *message)> call) & { return set(log_, std::move(call)); }
+
+  // The same of a temporary, which a reference then keeps.
+  settings backend(impinge::backend of) && { return std::move(backend(of)); }
+  settings method(impinge::method of) && { return std::move(method(of)); }
+  settings threads(std::uint32_t n) && { return std::move(threads(n)); }
+  settings memory_budget(std::uint64_t bytes) && { return std::move(memory_budget(bytes)); }
+  settings max_pairs(std::uint64_t n) && { return std::move(max_pairs(n)); }
+  settings reuse_margin(double length) && { return std::move(reuse_margin(length)); }
+  settings device(std::string name) && { return std::move(device(std::move(name))); }
+  settings cancelled(std::function<bool()> call) && { return std::move(cancelled(std::move(call))); }
+  settings progress(std::function<void(std::uint64_t done, std::uint64_t total)> call) && { return std::move(progress(std::move(call))); }
+  settings log(std::function<void(std::uint32_t level, const char *message)> call) && { return std::move(log(std::move(call))); }
 
 private:
   friend class detector;

@@ -322,7 +322,7 @@ enum class hits_of_ray : std::uint32_t { first = IMPINGE_HITS_FIRST, any = IMPIN
 enum class method : std::uint32_t { automatic = IMPINGE_METHOD_AUTO, clusters = IMPINGE_METHOD_CLUSTERS, cells = IMPINGE_METHOD_CELLS, naive = IMPINGE_METHOD_NAIVE };
 
 /// Which pairs, and how: one query for all questions. `impinge_query` in impinge.h describes each option. Setters return the query that they
-/// change, so keep one by value: in `const auto &of = query::all().distances()` it ends with the line.
+/// change; those of a temporary return it by value.
 class query {
 public:
   /// Everything: pairs of different bodies and self-collision.
@@ -339,22 +339,22 @@ public:
   /// Pairs of one body and any other, whatever their filters say.
   static query of(body a) { return of_bodies(1, 0, a, IMPINGE_ANY_BODY); }
 
-  query &kinds(std::initializer_list<pair_kind> kinds) {
+  query &kinds(std::initializer_list<pair_kind> kinds) & {
     raw_.kinds = 0;
     for (const auto kind : kinds) raw_.kinds |= static_cast<std::uint32_t>(kind);
     return *this;
   }
-  query &shared_vertex(impinge::shared_vertex rule) { return set(raw_.shared_vertex, static_cast<std::uint32_t>(rule)); }
+  query &shared_vertex(impinge::shared_vertex rule) & { return set(raw_.shared_vertex, static_cast<std::uint32_t>(rule)); }
   /// Leaves out the pairs of two bodies, or the self-collision of one.
-  query &exclude(body a, body b) { return leave_out(IMPINGE_EXCLUDE_BODIES, a, b, 0); }
+  query &exclude(body a, body b) & { return leave_out(IMPINGE_EXCLUDE_BODIES, a, b, 0); }
   /// Leaves out pairs of one body that are at most `n` edges apart in its surface. Nothing is proven of pairs that are left out: they may
   /// pass through each other.
-  query &exclude_rings(std::uint32_t n) { return leave_out(IMPINGE_EXCLUDE_RINGS, 0, 0, n); }
+  query &exclude_rings(std::uint32_t n) & { return leave_out(IMPINGE_EXCLUDE_RINGS, 0, 0, n); }
   /// Leaves out pairs of elements of two groups of vertices: see `scene::set_groups`.
-  query &exclude_groups(std::uint32_t g, std::uint32_t h) { return leave_out(IMPINGE_EXCLUDE_GROUPS, g, h, 0); }
+  query &exclude_groups(std::uint32_t g, std::uint32_t h) & { return leave_out(IMPINGE_EXCLUDE_GROUPS, g, h, 0); }
   /// Leaves out pairs of an element of `a` and one of `b` of which some vertices are listed together: the list of vertex v of `a` is
   /// vertices[offsets[v]] to vertices[offsets[v + 1] - 1], vertices of `b`. The arrays must live as long as the query is used.
-  template <class O, class V> query &exclude_vertices(body a, body b, O &&offsets, V &&vertices) {
+  template <class O, class V> query &exclude_vertices(body a, body b, O &&offsets, V &&vertices) & {
     static_assert(!detail::is_lost<O>::value && !detail::is_lost<V>::value, "the arrays must live as long as the query: give them names");
     leave_out(IMPINGE_EXCLUDE_VERTICES, a, b, 0);
     exclusions_.back().offsets = detail::rows_of(offsets, 1);
@@ -363,22 +363,22 @@ public:
   }
   /// Leaves out the pairs of an answer of `detector::near`, such as those that are near at rest. The query keeps them, whatever becomes of the
   /// answer.
-  template <class Near> query &exclude(const Near &rest_pairs) {
+  template <class Near> query &exclude(const Near &rest_pairs) & {
     kept_.push_back(rest_pairs.shared());
     rest_pairs_.push_back(rest_pairs.raw());
     return *this;
   }
   /// Bodies that do not move, of `detector::safe_distances`.
-  query &fixed(std::vector<body> bodies) {
+  query &fixed(std::vector<body> bodies) & {
     fixed_ = std::move(bodies);
     return *this;
   }
   /// How many nearest elements of each point `detector::closest` gives.
-  query &n_nearest(std::uint32_t n) { return set(raw_.n_nearest, n); }
+  query &n_nearest(std::uint32_t n) & { return set(raw_.n_nearest, n); }
   /// Of `detector::cast`.
-  query &hits(hits_of_ray which) { return set(raw_.hits, static_cast<std::uint32_t>(which)); }
+  query &hits(hits_of_ray which) & { return set(raw_.hits, static_cast<std::uint32_t>(which)); }
   /// Only the pairs of a half-open box of space.
-  query &owned_by(const std::array<double, 3> &low, const std::array<double, 3> &high) {
+  query &owned_by(const std::array<double, 3> &low, const std::array<double, 3> &high) & {
     raw_.flags |= IMPINGE_CELL;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       raw_.cell_low[axis] = low[axis];
@@ -386,25 +386,49 @@ public:
     }
     return *this;
   }
-  query &start(impinge::start rule) { return set(raw_.start, static_cast<std::uint32_t>(rule)); }
-  query &precision(impinge::precision of) { return set(raw_.precision, static_cast<std::uint32_t>(of)); }
+  query &start(impinge::start rule) & { return set(raw_.start, static_cast<std::uint32_t>(rule)); }
+  query &precision(impinge::precision of) & { return set(raw_.precision, static_cast<std::uint32_t>(of)); }
   /// The distance that counts as touching, a length.
-  query &separation(double length) { return set(raw_.separation, length); }
+  query &separation(double length) & { return set(raw_.separation, length); }
   /// What a step leaves, a length, and the share of its distance that a pair keeps at most.
-  query &clearance(double length, double share = 0.2) {
+  query &clearance(double length, double share = 0.2) & {
     raw_.clearance_share = share;
     return set(raw_.clearance, length);
   }
-  query &distances() { return set(raw_.flags, raw_.flags | IMPINGE_DISTANCES); }
-  query &closest_points() { return set(raw_.flags, raw_.flags | IMPINGE_CLOSEST_POINTS); }
+  query &distances() & { return set(raw_.flags, raw_.flags | IMPINGE_DISTANCES); }
+  query &closest_points() & { return set(raw_.flags, raw_.flags | IMPINGE_CLOSEST_POINTS); }
 
   /// Which pairs of elements may collide, of steps: see `impinge_query`. `user` must live as long as the query is asked. Several threads call
   /// the function at the same time. It must not throw: it is called by code that cannot unwind, unlike the callbacks of `settings`. Catch
   /// within it, keep the first std::exception_ptr under a lock, return 0, and rethrow after the question.
-  query &passes(int (*function)(void *user, const impinge_element *a, const impinge_element *b), void *user) {
+  query &passes(int (*function)(void *user, const impinge_element *a, const impinge_element *b), void *user) & {
     raw_.passes_user = user;
     raw_.passes = function;
     return *this;
+  }
+
+  // The same of a temporary, which a reference then keeps.
+  query kinds(std::initializer_list<pair_kind> of) && { return std::move(kinds(of)); }
+  query shared_vertex(impinge::shared_vertex rule) && { return std::move(shared_vertex(rule)); }
+  query exclude(body a, body b) && { return std::move(exclude(a, b)); }
+  query exclude_rings(std::uint32_t n) && { return std::move(exclude_rings(n)); }
+  query exclude_groups(std::uint32_t g, std::uint32_t h) && { return std::move(exclude_groups(g, h)); }
+  template <class O, class V> query exclude_vertices(body a, body b, O &&offsets, V &&vertices) && {
+    return std::move(exclude_vertices(a, b, std::forward<O>(offsets), std::forward<V>(vertices)));
+  }
+  template <class Near> query exclude(const Near &rest_pairs) && { return std::move(exclude(rest_pairs)); }
+  query fixed(std::vector<body> bodies) && { return std::move(fixed(std::move(bodies))); }
+  query n_nearest(std::uint32_t n) && { return std::move(n_nearest(n)); }
+  query hits(hits_of_ray which) && { return std::move(hits(which)); }
+  query owned_by(const std::array<double, 3> &low, const std::array<double, 3> &high) && { return std::move(owned_by(low, high)); }
+  query start(impinge::start rule) && { return std::move(start(rule)); }
+  query precision(impinge::precision of) && { return std::move(precision(of)); }
+  query separation(double length) && { return std::move(separation(length)); }
+  query clearance(double length, double share = 0.2) && { return std::move(clearance(length, share)); }
+  query distances() && { return std::move(distances()); }
+  query closest_points() && { return std::move(closest_points()); }
+  query passes(int (*function)(void *user, const impinge_element *a, const impinge_element *b), void *user) && {
+    return std::move(passes(function, user));
   }
 
   /// The query of C. It lives as long as this one is not changed.
