@@ -85,6 +85,7 @@ disposable(KeptPairs);
 function excluded(given) {
   if (given instanceof KeptPairs) return [3, KeptPairs.numberOf(given), 0];
   if (given === null || typeof given !== "object") refuse(`exclude: ${kindOf(given)} given, as in [[a, b]] an array of two bodies or an object is needed`);
+  if ("stats" in given) refuse(`exclude: ${kindOf(given)} given, an answer; scene.restPairs() finds pairs that are left out`);
   if (Symbol.iterator in given) return [0, ...two("exclude", given)];
   const { rings, groups, ...others } = given;
   mustBeNone("exclude", others, ["rings", "groups"]);

@@ -52,6 +52,7 @@ const OPTION = /^(clearance_share|closest_points|max_pairs|memory_budget|n_neare
 const camelized = (text) =>
   text
     .replace(OPTION, (name) => name.replace(/_(.)/g, (_, letter) => letter.toUpperCase()))
+    .replace(/^(\w+): (-?)inf given/, "$1: $2Infinity given")
     .replace("those that are named by `of` or `across`", "one by `of`")
     .replace(/^(body \d+), in the library's words: body \d+: /, "$1: ");
 
@@ -92,6 +93,7 @@ async function source(given, beside) {
 // What was given, as it is written in a program.
 export function shown(given) {
   if (typeof given === "string") return `"${given}"`;
+  if (typeof given === "object" && given !== null && !Array.isArray(given)) return kindOf(given);
   return typeof given === "bigint" ? `${given}n` : String(given);
 }
 
@@ -181,7 +183,9 @@ export function mustBeNone(what, others, allowed) {
 
 // The arrays of a mesh. One that was read has a name, a map and notes.
 export function meshOf(given) {
-  if (given === null || typeof given !== "object") refuse(`mesh: ${kindOf(given)} given, an object with positions is needed`);
+  if (given === null || typeof given !== "object" || Symbol.iterator in given) {
+    refuse(`mesh: ${kindOf(given)} given, an object with positions is needed, as in { positions, faces }`);
+  }
   const { positions, faces, tetrahedra, edges, name: _name, map: _map, notes: _notes, ...others } = given;
   mustBeNone("mesh", others, ["positions", "faces", "tetrahedra", "edges"]);
   // Without elements, vertices are points: whoever names elements has forgotten them.

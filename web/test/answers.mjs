@@ -186,11 +186,13 @@ export async function refusals(module) {
   said.exclude = await ask("detect", { exclude: [a, a] });
   said.ring = await ask("detect", { exclude: [{ ring: 1 }] });
   said.rings = await ask("detect", { exclude: { rings: 2 } });
+  said.answer = await ask("detect", { exclude: [detector.near(scene, 1)] });
   said.matrix4 = await refusal(() => scene.setTransform(a, { elements: Array(16).fill(0) }));
   said.filter = await refusal(() => scene.setFilter(a, 2n ** 64n));
   said.pinned = await refusal(() => scene.setPinned(a, ["no", "no", "no"]));
   said.pinnedNumbers = await refusal(() => scene.setPinned(a, [2, 1, 0]));
   said.nothing = await refusal(() => scene.add());
+  said.arrays = await refusal(() => scene.add(triangle, index));
   said.forgotten = await refusal(() => scene.add({ faces: undefined, positions: triangle }));
   said.welded = await refusal(() => weld({ faces: undefined, positions: triangle }));
   said.within = await ask("detect", { progress: () => detector.count(scene) });
@@ -205,6 +207,7 @@ export async function refusals(module) {
   said.both = await ask("impacts", { which: "self", of: a });
   said.separation = await ask("impacts", { separation: NaN });
   said.text = await ask("near", "1");
+  said.endless = await ask("near", Infinity);
   said.inflation = await ask("candidates", -1);
   said.control = await ask("distance", a, a, { start: "skip" });
   said.scene = await refusal(() => detector.detect({}));
@@ -358,11 +361,13 @@ export const REFUSALS = {
   exclude: "invalid: exclude: 0 given, as in [[a, b]] an array of two bodies or an object is needed",
   ring: 'invalid: exclude: "ring" given, rings or groups allowed',
   rings: "invalid: exclude: an Object given, an array is needed",
+  answer: "invalid: exclude: a NearPairs given, an answer; scene.restPairs() finds pairs that are left out",
   matrix4: "invalid: transform: an Object given, 16 numbers allowed, column by column, as elements of a Matrix4",
   filter: "invalid: category: 18446744073709551616n given, a whole number of 64 bits is needed",
   pinned: 'invalid: pinned: "no" given, true or false is needed',
   pinnedNumbers: "invalid: pinned: 2 given, true or false is needed",
-  nothing: "invalid: mesh: undefined given, an object with positions is needed",
+  nothing: "invalid: mesh: undefined given, an object with positions is needed, as in { positions, faces }",
+  arrays: "invalid: mesh: a Float64Array given, an object with positions is needed, as in { positions, faces }",
   forgotten: "invalid: faces: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no faces",
   welded: "invalid: faces: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no faces",
   within: "invalid: a scene or a detector is used while it answers a question, or after the module has stopped",
@@ -381,6 +386,7 @@ export const REFUSALS = {
   both: 'invalid: query: "which" and "of" given, one of them allowed',
   separation: "invalid: separation: NaN given, a finite number that is not below 0 allowed",
   text: 'invalid: distance: "1" given, a number is needed',
+  endless: "invalid: distance: Infinity given, a finite number that is not below 0 allowed",
   inflation: "invalid: inflation: -1 given, a finite number that is not below 0 allowed",
   control: 'invalid: control: "start" given, signal or progress allowed',
   scene: "invalid: scene: a Scene of the same module is needed",
