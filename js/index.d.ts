@@ -604,6 +604,8 @@ export interface Truncation {
   readonly nTouching: number;
   /** How often pairs were looked at again. */
   readonly rounds: number;
+  /** The pairs that stopped vertices, those that touch at the start included. */
+  readonly pairs: Candidates;
   /** As in `Impacts`. */
   readonly startIntersects: boolean | null;
   readonly stats: Stats;

@@ -1,6 +1,6 @@
 // Answers about points, rays and bounds of vertices. They were copied out of the module, so there is nothing to free.
 
-import { NearPairs, Step, hex, sections } from "./answers.js";
+import { Candidates, NearPairs, Step, hex, sections } from "./answers.js";
 import { KINDS } from "./query.js";
 import { body, refuse, word } from "./shared.js";
 
@@ -120,8 +120,10 @@ export class SafeDistances {
 export class Truncation extends Step {
   constructor(lists, stats) {
     super(lists);
-    const [, [start], [nCut, nTouching, rounds]] = lists;
-    Object.assign(this, { nCut, nTouching, rounds, startIntersects: [false, true, null][start], stats });
+    const [rows, bytes, [nCut, nTouching, rounds], , , hash] = lists;
+    const n = rows.length / 4;
+    const pairs = new Candidates([rows, bytes.subarray(0, n), , , , hash], stats);
+    Object.assign(this, { nCut, nTouching, rounds, pairs, startIntersects: [false, true, null][bytes[n]], stats });
   }
 }
 

@@ -622,6 +622,7 @@ export async function others(module) {
     same: lists.ee === lists.reversed("ee"),
     ringed: ringed.length,
     truncation: [truncation.nCut, truncation.nTouching, truncation.rounds > 0, truncation.startIntersects, truncation.positions(lower)],
+    stopped: [truncation.pairs.length > 0, truncation.pairs.rows.length / 4 === truncation.pairs.length, [...truncation.pairs].every(({ bodyA, bodyB }) => bodyA === lower && bodyB === upper)],
     rigid: [...heights, still2],
     late,
     reached: [reached > 0 && reached < 0.01, step.positions(upper)[2] === reached, await detector.any(step)],
@@ -880,6 +881,7 @@ export const OTHERS = {
     same: true,
     ringed: 0,
     truncation: [3, 0, true, false, null],
+    stopped: [true, true, true],
     rigid: [1, 0, 2, 0, 3, 0, 3],
     late: [
       "invalid: body 1: this was found for other positions than it has now, so nothing is known of it; ask again",

@@ -142,7 +142,7 @@ impl Answer {
     }
 
     /// The kind of each row.
-    fn of_candidates(candidates: &Candidates, world: &World) -> Self {
+    pub(crate) fn of_candidates(candidates: &Candidates, world: &World) -> Self {
         let mut answer = Answer {
             hash: candidates.hash(),
             ..Answer::default()

@@ -81,10 +81,11 @@ impl Answer {
         answer
     }
 
-    /// How many vertices were stopped, how many pairs touch, rounds; whether the start intersects,
-    /// as for impacts; the bodies that move and their positions.
+    /// The pairs that stopped vertices as candidates; how many vertices were stopped, how many pairs
+    /// touch, rounds; whether the start intersects, as for impacts; the bodies that move and their
+    /// positions.
     fn of_truncation(truncation: &Truncation, world: &World) -> Self {
-        let mut answer = Answer::default();
+        let mut answer = Answer::of_candidates(&truncation.pairs(), world);
         answer
             .bytes
             .push(truncation.start_intersects().map_or(2, u8::from));
