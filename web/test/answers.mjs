@@ -622,7 +622,7 @@ export async function others(module) {
     same: lists.ee === lists.reversed("ee"),
     ringed: ringed.length,
     truncation: [truncation.nCut, truncation.nTouching, truncation.rounds > 0, truncation.startIntersects, truncation.positions(lower)],
-    stopped: [truncation.pairs.length > 0, truncation.pairs.rows.length / 4 === truncation.pairs.length, [...truncation.pairs].every(({ bodyA, bodyB }) => bodyA === lower && bodyB === upper)],
+    stopped: [truncation.pairs.length > 0, truncation.pairs.rows.length / 4 === truncation.pairs.length, [...truncation.pairs].every(({ bodyA, bodyB }) => bodyA !== bodyB && [lower, upper].includes(bodyA))],
     rigid: [...heights, still2],
     late,
     reached: [reached > 0 && reached < 0.01, step.positions(upper)[2] === reached, await detector.any(step)],
