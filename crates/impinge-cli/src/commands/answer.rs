@@ -9,7 +9,7 @@ use impinge_io::{Cell, ELEMENTS, printable};
 use crate::apart::Inputs;
 use crate::args::{AnswerArgs, AskArgs, DetectorArgs, PairsArgs, WithinArgs};
 use crate::asked::Asked;
-use crate::detection::{asked, hit, query, repeat, settings};
+use crate::detection::{Times, asked, hit, query, repeat, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading, Vertices};
 use crate::picture::Drawer;
@@ -150,6 +150,11 @@ fn answer(
         } else {
             let mut line = Vec::new();
             headline::write_count(&mut line, (&scene, &nouns), &bodies, &text)?;
+            if ask.verbose {
+                let times = Times::default().and(detector.stats());
+                writeln!(line, "\n{}\n", output::stage_table(&times))?;
+                writeln!(line, "{}", output::how(detector.stats(), &times))?;
+            }
             writeln!(line, "{}", asked.line(&read, &nouns))?;
             output::out().write_all(&line)?;
         }

@@ -124,8 +124,10 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
                 has_kinds: !args.step.kinds.is_empty(),
                 ..asked
             };
-            let line = asked.line_of_thick(&vertices, &nouns, &args.step.thickness) + "\n";
-            output::say(line.as_bytes(), file.as_ref())?;
+            let line = asked.line_of_thick(&vertices, &nouns, &args.step.thickness);
+            let stages = stages(args, &steps.times);
+            let text = format!("{}\n{stages}{line}\n", steps.total());
+            output::say(text.as_bytes(), file.as_ref())?;
         }
         return frames.end(steps.end(args.ask.fail_on_hit));
     }
@@ -157,21 +159,31 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
                 frame: Some(named),
                 ..found
             })?;
-        } else if prints {
-            lines.frame(&named, &bodies, pairs)?;
+        } else {
+            lines.add(pairs);
+            if prints {
+                Lines::frame(&named, &bodies, pairs)?;
+            }
         }
         watch.frame_done();
     }
     drop(watch);
     outputs.finish()?;
-    if prints {
-        lines.end()?;
-    }
     if !args.ask.json {
-        let line = asked.line(&vertices, &nouns) + "\n";
-        output::say(line.as_bytes(), file.as_ref())?;
+        let line = asked.line(&vertices, &nouns);
+        let stages = stages(args, &lines.times);
+        let text = format!("{}{stages}{line}\n", lines.total());
+        output::say(text.as_bytes(), file.as_ref())?;
     }
     frames.end(hit(args.ask.fail_on_hit, n_pairs > 0))
+}
+
+/// With `-v`, the median time of each stage.
+fn stages(args: &SequenceArgs, times: &Times) -> String {
+    match args.ask.verbose {
+        true => format!("\n{}\n\n", output::stage_table(times)),
+        false => String::new(),
+    }
 }
 
 /// The frames of a mesh, which is the first file, and the file that names them.
@@ -446,12 +458,13 @@ impl Lines {
         Ok(to.flush()?)
     }
 
-    fn frame(
-        &mut self,
-        named: &report::Frame,
-        bodies: &[(BodyId, &str)],
-        pairs: &Pairs,
-    ) -> Result<(), Error> {
+    fn add(&mut self, pairs: &Pairs) {
+        self.times.add(pairs.stats());
+        let (least, most) = self.extremes.unwrap_or((pairs.len(), pairs.len()));
+        self.extremes = Some((least.min(pairs.len()), most.max(pairs.len())));
+    }
+
+    fn frame(named: &report::Frame, bodies: &[(BodyId, &str)], pairs: &Pairs) -> Result<(), Error> {
         let colliding: usize = bodies
             .iter()
             .map(|&(id, _)| pairs.colliding(id).len())
@@ -473,26 +486,21 @@ impl Lines {
                 None => hash,
             }
         )?;
-        to.flush()?;
-        self.times.add(pairs.stats());
-        let (least, most) = self.extremes.unwrap_or((pairs.len(), pairs.len()));
-        self.extremes = Some((least.min(pairs.len()), most.max(pairs.len())));
-        Ok(())
+        Ok(to.flush()?)
     }
 
-    fn end(&self) -> Result<(), Error> {
+    /// The line about all frames; nothing if there was none.
+    fn total(&self) -> String {
         let Some((least, most)) = self.extremes else {
-            return Ok(());
+            return String::new();
         };
-        writeln!(
-            out(),
-            "{}, {} to {} pairs; median {:.3} ms, 95 % within {:.3} ms",
+        format!(
+            "{}, {} to {} pairs; median {:.3} ms, 95 % within {:.3} ms\n",
             counted(self.times.n_frames() as u64, "frame"),
             grouped(least as u64),
             grouped(most as u64),
             self.times.total_ms(50),
             self.times.total_ms(95)
-        )?;
-        Ok(())
+        )
     }
 }

@@ -389,6 +389,12 @@ fn pairs_are_limited_counted_and_asked_for() {
         counted,
         format!("pile.obj: 1,770 pairs of 60 triangles\n{asked}")
     );
+    let stages = folder.run(["self", "pile.obj", "--count", "-v"]).printed();
+    assert!(stages.starts_with(counted.lines().next().expect("a line")));
+    assert!(
+        stages.contains("\nstage ") && stages.contains(" on cpu, "),
+        "{stages}"
+    );
     let object = folder.run(["self", "pile.obj", "--count", "--json"]).json();
     assert_eq!(
         keys(&object),

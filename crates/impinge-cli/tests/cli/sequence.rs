@@ -197,6 +197,23 @@ fn text_for_people() {
         lines[7],
         "within 1 mesh, 0 vertices welded, neighbours resolved"
     );
+    // With rows on standard output, what is said of all frames goes to standard error.
+    for (more, total) in [(&[][..], "5 frames, 0 to "), (&["--ccd"], "4 steps, ")] {
+        let asked = ["sequence", "ball.ply", "run.pc2", "--rows", "-"];
+        let run = folder.run(asked.iter().chain(more));
+        assert!(run.stdout.starts_with("frame,"), "{}", run.stdout);
+        let said: Vec<&str> = run.stderr.lines().collect();
+        assert!(said[0].starts_with(total), "{}", run.stderr);
+        assert!(said[1].starts_with("within 1 mesh, "), "{}", run.stderr);
+        // And with -v the median time of each stage, before the last line.
+        let run = folder.run(asked[..3].iter().chain(&["-v"]).chain(more));
+        let said: Vec<&str> = run.stdout.lines().collect();
+        let stages = said.iter().position(|line| line.starts_with("stage "));
+        let stages = &said[stages.expect("a table")..];
+        assert!(stages[0].contains("ms, median of "), "{}", run.stdout);
+        assert!(stages.iter().any(|line| line.starts_with("total ")));
+        assert!(stages[stages.len() - 1].starts_with("within 1 mesh, "));
+    }
     // Beside another mesh, self-collision is no longer asked for unless it is said, and the answer
     // says so.
     let args = ["sequence", "ball.ply", "run.pc2", "--other", "ring.ply"];

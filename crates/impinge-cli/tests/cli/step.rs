@@ -705,6 +705,14 @@ fn a_start_that_intersects_is_never_free() {
     folder.text("fold.obj", &format!("{vertices}{faces}"));
     let run = folder.run(["step", "fold.obj", "fold.obj", "--fail-on-hit"]);
     assert_eq!(run.code, Some(4), "{}", run.stdout);
+    // Who takes two files for two meshes sees that they are the ends of one.
+    assert!(run.stdout.contains("\nfold.obj stays\n"), "{}", run.stdout);
+    let moved = vertices.replace("-1", "0.5");
+    folder.text("unfold.obj", &format!("{moved}{faces}"));
+    let both = ["step", "fold.obj", "fold.obj", "fold.obj", "unfold.obj"];
+    let run = folder.run(both);
+    let ways = "\nfold.obj stays, fold.obj moves to unfold.obj\n";
+    assert!(run.stdout.contains(ways), "{}", run.stdout);
 }
 
 /// Two sheets that lie close to each other at first, and a third one that comes from afar.

@@ -243,8 +243,29 @@ impl<'a> Found<'a> {
                 hex(self.origins.hash_of_impacts(all))
             )?;
         }
+        writeln!(to, "{}", ways(bodies))?;
         writeln!(to, "{}", output::how(self.stats, &self.times))
     }
+}
+
+/// The most bodies of which an answer says where they go.
+const MOST_WAYS: usize = 4;
+
+/// Which files are whose ends: two files of different meshes would be one mesh that moves.
+fn ways(bodies: &Moving) -> String {
+    let names = bodies.names.iter().take(MOST_WAYS);
+    let way = |names: &[String; 2]| {
+        let [start, end] = names.each_ref().map(|name| printable(name));
+        match start == end {
+            true => format!("{start} stays"),
+            false => format!("{start} moves to {end}"),
+        }
+    };
+    let mut ways: Vec<String> = names.map(way).collect();
+    if let Some(n @ 1..) = bodies.names.len().checked_sub(MOST_WAYS) {
+        ways.push(format!("{n} more"));
+    }
+    ways.join(", ")
 }
 
 fn counts(impacts: &Impacts) -> [(PairKind, u64); KINDS.len()] {

@@ -23,9 +23,24 @@ pub struct Steps {
     /// Those whose start was asked for intersections.
     n_asked: u64,
     n_intersecting: u64,
+    pub times: Times,
 }
 
 impl Steps {
+    /// The line about all steps.
+    pub fn total(&self) -> String {
+        let start = match self.n_intersecting {
+            0 if self.n_asked < self.n => " if their starts are, which was not asked".to_owned(),
+            0 => String::new(),
+            n => format!(", {} intersecting at the start", grouped(n)),
+        };
+        format!(
+            "{}, {} free of contact{start}",
+            counted(self.n, "step"),
+            grouped(self.n_free)
+        )
+    }
+
     /// What the program ends with.
     pub fn end(&self, fail_on_hit: bool) -> Result<(), Error> {
         match self.n_intersecting {
@@ -115,6 +130,7 @@ pub fn steps_of_sequence(
         let frame_ix = end_ix - 1;
         let impacts = detector.impacts(scene, step)?;
         let found = Found::all(origins, &impacts, Times::default());
+        steps.times.add(impacts.stats());
         steps.n += 1;
         steps.n_free += u64::from(found.is_free());
         let intersects = impacts.start_intersects() == Some(true);
@@ -155,20 +171,6 @@ pub fn steps_of_sequence(
     }
     if let Some(rows) = shown.rows {
         rows.finish()?;
-    }
-    if shown.text {
-        writeln!(
-            out(),
-            "{}, {} free of contact{}",
-            counted(steps.n, "step"),
-            grouped(steps.n_free),
-            match steps.n_intersecting {
-                0 if steps.n_asked < steps.n =>
-                    " if their starts are, which was not asked".to_owned(),
-                0 => String::new(),
-                n => format!(", {} intersecting at the start", grouped(n)),
-            }
-        )?;
     }
     Ok(steps)
 }
