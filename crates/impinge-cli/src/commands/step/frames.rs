@@ -162,7 +162,10 @@ pub fn steps_of_sequence(
                     Some(first) => format!("{:?}", first.toi),
                 },
                 impacts.stats().total_ms,
-                found.hash().unwrap_or_default()
+                match impacts.is_empty() {
+                    true => "-".to_owned(),
+                    false => found.hash().unwrap_or_default(),
+                }
             )?;
         }
         out().flush()?;
