@@ -1,7 +1,8 @@
 //! One list of cases and one way to compare answers, for every method and backend.
 
 use impinge_core::{
-    Backend, BodyId, Detector, Method, Pairs, Query, Scene, Settings, SharedVertex, hash_rows,
+    Backend, BodyId, Detector, InstructionSet, Method, Pairs, Query, Scene, Settings, SharedVertex,
+    hash_rows,
 };
 use impinge_scenes::{Model, Random, adversarial, soup, surfaces};
 
@@ -26,11 +27,17 @@ pub fn detector(method: Method, threads: usize) -> Detector {
     Detector::new(cpu(method, threads)).expect("settings")
 }
 
-/// Detectors that must give the same bytes.
-pub fn detectors() -> [Detector; 3] {
+/// Detectors that must give the same bytes: each instruction set, one thread and several, and the
+/// oracle last.
+pub fn detectors() -> [Detector; 4] {
+    let with = |instruction_set, threads| {
+        let settings = cpu(Method::Clusters, threads).instruction_set(instruction_set);
+        Detector::new(settings).expect("settings")
+    };
     [
-        detector(Method::Clusters, 1),
-        detector(Method::Clusters, 4),
+        with(InstructionSet::Portable, 1),
+        with(InstructionSet::Avx2, 2),
+        with(InstructionSet::Avx512, 4),
         detector(Method::Naive, 2),
     ]
 }
