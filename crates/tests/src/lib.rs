@@ -1,8 +1,8 @@
 //! One list of cases and one way to compare answers, for every method and backend.
 
 use impinge_core::{
-    Backend, BodyId, Detector, InstructionSet, Method, Pairs, Query, Scene, Settings, SharedVertex,
-    hash_rows,
+    Backend, BodyId, Detector, InstructionSet, Method, Pairs, Part, Query, Scene, Settings,
+    SharedVertex, hash_rows,
 };
 use impinge_scenes::{Model, Random, adversarial, soup, surfaces};
 
@@ -40,6 +40,32 @@ pub fn detectors() -> [Detector; 4] {
         with(InstructionSet::Avx512, 4),
         detector(Method::Naive, 2),
     ]
+}
+
+/// How thick an element is, from the numbers that its body was given: if these are about elements of
+/// another part, as thick as the thickest of them that has all of its vertices, or whose vertices it
+/// has.
+pub fn thickness_of(scene: &Scene, body: BodyId, part: Part, element: u32) -> f64 {
+    let held = scene.body(body).expect("known");
+    let Some((given, each)) = held.thickness_by_element() else {
+        return held.thickness();
+    };
+    if given == part {
+        return each[element as usize];
+    }
+    let corners = |part, element: u32| match part {
+        Part::Vertices => vec![element],
+        _ => held.part(part).corners(element as usize).to_vec(),
+    };
+    let own = corners(part, element);
+    let holds = |a: &[u32], b: &[u32]| b.iter().all(|id| a.contains(id));
+    (0..).zip(each).fold(0.0, |most: f64, (other, &thickness)| {
+        let other = corners(given, other);
+        match holds(&other, &own) || holds(&own, &other) {
+            true => most.max(thickness),
+            false => most,
+        }
+    })
 }
 
 /// The rows of an answer.

@@ -10,7 +10,7 @@ use impinge_core::{
     NearPair, NearPairs, PairKind, Part, Query, Scene, Settings, Thickness,
 };
 use impinge_scenes::{Random, adversarial, soup, surfaces};
-use impinge_tests::{detector, detectors};
+use impinge_tests::{detector, detectors, thickness_of};
 
 type Point = [f64; 3];
 
@@ -327,22 +327,6 @@ pub fn thickness(part: Part, each: &[f64]) -> Thickness<'_> {
     }
 }
 
-/// How thick an element is, if the elements of one part have these: that of the thickest one whose
-/// vertices it has, or that has all of its vertices.
-pub fn thickness_of(scene: &Scene, of: &Element, by: Part, (part, each): (Part, &[f64])) -> f64 {
-    if by == part {
-        return each[of.number as usize];
-    }
-    let beside = elements(scene, part);
-    let beside = beside.iter().filter(|other| other.body == of.body);
-    let holds = |a: &[u32], b: &[u32]| b.iter().all(|id| a.contains(id));
-    beside
-        .filter(|other| holds(&other.ids, &of.ids) || holds(&of.ids, &other.ids))
-        .fold(0.0, |most: f64, other| {
-            most.max(each[other.number as usize])
-        })
-}
-
 pub const PARTS: [Part; 3] = [Part::Vertices, Part::Edges, Part::Faces];
 
 /// One number per vertex, edge or face, each beside bodies with one number: as pair by pair.
@@ -354,25 +338,19 @@ fn each_element_may_have_its_own_thickness() {
         let bodies: Vec<BodyId> = scene.bodies().map(|(id, _)| id).collect();
         let mut random = Random::new(seed);
         let part = PARTS[seed as usize % 3];
-        let mut of_bodies = vec![None; bodies.len()];
         for (ix, &body) in bodies.iter().enumerate() {
             if ix % 2 == 0 || seed % 4 == 0 {
                 let each = thickness_by(&mut random, &scene, body, part);
                 scene
                     .set_thickness(body, thickness(part, &each))
                     .expect("good");
-                of_bodies[ix] = Some(each);
+                let held = scene.body(body).expect("known");
+                assert_eq!(held.thickness_by_element(), Some((part, &each[..])));
             } else {
                 scene.set_thickness(body, 0.5).expect("good");
             }
         }
-        let own = |of: &Element, by: Part| {
-            let ix = bodies.iter().position(|&body| body == of.body);
-            match &of_bodies[ix.expect("known")] {
-                Some(each) => thickness_of(&scene, of, by, (part, each)),
-                None => 0.5,
-            }
-        };
+        let own = |of: &Element, by: Part| thickness_of(&scene, of.body, by, of.number);
         for distance in [0.0, 0.25, 1.0] {
             // An edge and a face meet or not.
             let expected = expected_of(&scene, |[a, b], [of_a, of_b]| {

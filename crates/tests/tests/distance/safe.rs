@@ -1,12 +1,12 @@
 //! How far vertices may move, and neighbours by element: against every pair by the exact tests.
 
+use super::near::{PARTS, thickness};
 use impinge_core::exact::{ElementPair, Point, are_within, closest_points, edge_face_are_within};
 use impinge_core::{
     BodyId, Bounds, Csr, Elements, Error, Method, PairKind, Part, Query, SafeDistances, Scene,
-    Thickness,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
-use impinge_tests::{detector, detectors};
+use impinge_tests::{detector, detectors, thickness_of};
 
 /// An element of one body, by its corners.
 #[derive(Debug, Clone)]
@@ -136,17 +136,7 @@ pub(super) fn check_those(
     (most, fixed): (f64, &[BodyId]),
     keeps: impl Fn(PairKind, &Held, &Held) -> bool,
 ) -> [usize; 2] {
-    let thickness = |of: &Held| {
-        let body = scene.body(of.body).expect("held");
-        match body.thickness_by_element() {
-            None => body.thickness(),
-            // Of vertices; an edge or a face is as thick as the thickest of its own.
-            Some((_, each)) => {
-                let own = of.corners.iter().map(|&corner| each[corner as usize]);
-                own.fold(0.0, f64::max)
-            }
-        }
-    };
+    let thickness = |of: &Held| thickness_of(scene, of.body, of.part, of.element);
     let mut least = std::collections::BTreeMap::new();
     let (mut n_touching, mut n_bounded) = (0, 0);
     for held in [Part::Vertices, Part::Edges, Part::Faces].map(|part| elements(scene, part)) {
@@ -210,6 +200,7 @@ pub(super) fn check_those(
     for ((body, corner), least) in least {
         let bound = safe.of(body).expect("held").get(corner as usize);
         assert!(bound <= most);
+        assert!(bound == 0.0 || !fixed.contains(&body), "{body:?} {corner}");
         assert!(
             bound >= least * (1.0 - 1.0 / 1024.0) - 1e-300,
             "{body:?} {corner}: {bound} {least}"
@@ -249,6 +240,18 @@ pub(super) fn scene(seed: u64, is_lattice: bool, is_double: bool) -> (Scene, Vec
     (scene, bodies)
 }
 
+/// Gives each element of a part of a body its own thickness.
+pub(super) fn set_each(scene: &mut Scene, body: BodyId, part: Part, of: impl Fn(usize) -> f64) {
+    let held = scene.body(body).expect("held");
+    let n = match part {
+        Part::Vertices => held.n_vertices(),
+        _ => held.part(part).len(),
+    };
+    let each = Vec::from_iter((0..n).map(of));
+    let set = scene.set_thickness(body, thickness(part, &each));
+    set.expect("good");
+}
+
 #[test]
 fn together_two_elements_move_less_than_they_are_apart() {
     let (mut n_touching, mut n_bounded) = (0, 0);
@@ -267,9 +270,11 @@ fn together_two_elements_move_less_than_they_are_apart() {
                 scene.set_thickness(bodies[2], 0.03).expect("good");
             }
             if seed % 4 == 2 {
-                let each = [0.0, 0.1, 0.02, 0.0, 0.3, 0.0, 0.05, 0.0, 0.0];
-                let each = Thickness::vertices(&each[..]);
-                scene.set_thickness(bodies[0], each).expect("good");
+                let part = PARTS[seed as usize / 4 % 3];
+                set_each(&mut scene, bodies[0], part, |ix| {
+                    [0.0, 0.1, 0.02, 0.0, 0.3, 0.0, 0.05, 0.0, 0.0][ix % 9]
+                });
+                set_each(&mut scene, bodies[1], part, |ix| 0.01 * ix as f64);
                 scene.set_thickness(bodies[2], 0.03).expect("good");
             }
             let most = [0.05, 0.3, 2.0][seed as usize % 3];
@@ -383,6 +388,13 @@ fn bounds_are_less_than_distances_that_are_floats() {
     }
 }
 
+/// How thick a body is: one number, or one for each element of a part.
+#[derive(Debug)]
+enum Thick {
+    Whole(f64),
+    Each(Part),
+}
+
 /// Pairs that give no vertex less are dropped before they are measured: with many of nearly the
 /// same distance, and some that touch, the answer is that of the method which drops none.
 #[test]
@@ -404,23 +416,26 @@ fn pairs_that_are_dropped_would_not_count() {
         } else {
             scene.add((sheet.elements.clone(), at)).expect("good")
         };
-        let each: Vec<f64> = (0..sheet.positions.len())
-            .map(|ix| 0.3 + 1e-7 * (ix % 3) as f64)
-            .collect();
-        for thickness in [Thickness::from(0.0), 0.3.into(), Thickness::vertices(each)] {
-            scene.set_thickness(upper, thickness.clone()).expect("good");
+        let wholes = [Thick::Whole(0.0), Thick::Whole(0.3)].into_iter();
+        for thick in wholes.chain(PARTS.map(Thick::Each)) {
+            match thick {
+                Thick::Whole(one) => scene.set_thickness(upper, one).expect("good"),
+                Thick::Each(part) => {
+                    set_each(&mut scene, upper, part, |ix| 0.3 + 1e-7 * (ix % 3) as f64);
+                }
+            }
             for fixed in [&[][..], &[lower]] {
                 let query = Query::all().fixed(fixed.iter().copied());
-                let [naive, others @ ..] = detectors().map(|mut detector| {
+                let [first, others @ ..] = detectors().map(|mut detector| {
                     detector.safe_distances(&scene, 0.9, &query).expect("good")
                 });
                 let rows = |of: &SafeDistances| of.touching().iter().collect::<Vec<_>>();
-                assert_eq!(rows(&naive).is_empty(), round % 2 == 0);
+                assert_eq!(rows(&first).is_empty(), round % 2 == 0);
                 for other in others {
                     for body in [lower, upper] {
-                        assert_eq!(naive.of(body), other.of(body), "{round} {thickness:?}");
+                        assert_eq!(first.of(body), other.of(body), "{round} {thick:?}");
                     }
-                    assert_eq!(rows(&naive), rows(&other), "{round} {thickness:?}");
+                    assert_eq!(rows(&first), rows(&other), "{round} {thick:?}");
                 }
             }
         }

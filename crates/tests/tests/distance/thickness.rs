@@ -1,7 +1,7 @@
 //! Steps and candidates of bodies that are thick: against every pair by the exact test with the sum
 //! of the separation and the thickness of both elements.
 
-use crate::near::{Element, PARTS, elements, thickness, thickness_by, thickness_of};
+use crate::near::{PARTS, thickness, thickness_by};
 use crate::separation::{
     Elements, contacts, first_kept, impacts, is_the_same_everywhere, lattice, rows, two_soups,
 };
@@ -10,50 +10,30 @@ use impinge_core::{
     BodyId, Clearance, Impact, Method, PairKind, Part, Precision, Query, Scene, Start, Thickness,
 };
 use impinge_scenes::Random;
-use impinge_tests::{detector, detectors};
+use impinge_tests::{detector, detectors, thickness_of};
 
 /// A scene in which bodies have a thickness for each vertex, edge or face, or one number.
-struct Thick {
-    scene: Scene,
-    part: Part,
-    /// By body.
-    each: Vec<(BodyId, Option<Vec<f64>>)>,
+fn thick(seed: u64) -> Scene {
+    let mut scene = lattice(seed);
+    let mut random = Random::new(seed);
+    let part = PARTS[seed as usize % 3];
+    let bodies = Vec::from_iter(scene.bodies().map(|(id, _)| id));
+    for (ix, body) in bodies.into_iter().enumerate() {
+        let is_by_element = ix % 2 == 0 || seed.is_multiple_of(2);
+        let own = is_by_element.then(|| thickness_by(&mut random, &scene, body, part));
+        let given = match &own {
+            Some(own) => thickness(part, own),
+            None => 0.5.into(),
+        };
+        scene.set_thickness(body, given).expect("good");
+    }
+    scene
 }
 
-impl Thick {
-    fn new(seed: u64) -> Self {
-        let mut scene = lattice(seed);
-        let mut random = Random::new(seed);
-        let part = PARTS[seed as usize % 3];
-        let bodies = Vec::from_iter(scene.bodies().map(|(id, _)| id));
-        let mut each = Vec::new();
-        for (ix, body) in bodies.into_iter().enumerate() {
-            let own = (ix % 2 == 0 || seed.is_multiple_of(2))
-                .then(|| thickness_by(&mut random, &scene, body, part));
-            let given = match &own {
-                Some(own) => thickness(part, own),
-                None => 0.5.into(),
-            };
-            scene.set_thickness(body, given).expect("good");
-            each.push((body, own));
-        }
-        Thick { scene, part, each }
-    }
-
-    /// How thick two elements are together. Sums of these numbers are exact.
-    fn of(&self, pair: Elements) -> f64 {
-        let own = pair.map(|(body, part, number)| {
-            let (_, own) = (self.each.iter().find(|(id, _)| *id == body)).expect("known");
-            let Some(own) = own else {
-                return 0.5;
-            };
-            let all = elements(&self.scene, part);
-            let is_it = |of: &&Element| of.body == body && of.number == number;
-            let element = all.iter().find(is_it).expect("an element");
-            thickness_of(&self.scene, element, part, (self.part, own))
-        });
-        own[0] + own[1]
-    }
+/// How thick two elements are together. Sums of these numbers are exact.
+fn of_both(scene: &Scene, pair: Elements) -> f64 {
+    let [a, b] = pair.map(|(body, part, number)| thickness_of(scene, body, part, number));
+    a + b
 }
 
 /// Asks all detectors for a step, and compares with what is expected.
@@ -75,11 +55,10 @@ fn check(scene: &Scene, step: &Query, expected: &[crate::separation::Row]) {
 fn elements_of_a_step_keep_their_thickness_pair_by_pair() {
     let mut n_later = 0;
     for seed in 0..6 {
-        let thick = Thick::new(seed);
-        let scene = &thick.scene;
+        let scene = &thick(seed);
         for separation in [0.0, 0.25, 1.0] {
             let expected = contacts(scene, |pair, elements, [start, end]| {
-                first_within(pair, start, end, separation + thick.of(elements))
+                first_within(pair, start, end, separation + of_both(scene, elements))
             });
             let step = (Query::all().separation(separation)).precision(Precision::F64);
             check(scene, &step, &expected);
@@ -88,7 +67,7 @@ fn elements_of_a_step_keep_their_thickness_pair_by_pair() {
                 continue;
             }
             let expected = contacts(scene, |pair, elements, ends| {
-                let kept = separation + thick.of(elements);
+                let kept = separation + of_both(scene, elements);
                 first_kept(pair, ends, kept, (0.5, 0.75))
             });
             let clearance = Clearance::new(0.5).share(0.75);
@@ -102,9 +81,9 @@ fn elements_of_a_step_keep_their_thickness_pair_by_pair() {
 fn candidates_are_boxes_that_reach_by_the_thickness_too() {
     let mut n_found = 0;
     for seed in 0..6 {
-        let thick = Thick::new(seed);
+        let scene = thick(seed);
         for inflation in [0.0, 0.125, 0.5] {
-            let expected = contacts(&thick.scene, |pair, elements, [start, end]| {
+            let expected = contacts(&scene, |pair, elements, [start, end]| {
                 // The first corners are those of the element that an exact test names first.
                 let n = if pair == impinge_core::exact::ElementPair::EdgeEdge {
                     2
@@ -118,7 +97,7 @@ fn candidates_are_boxes_that_reach_by_the_thickness_too() {
                         [low.min(x), high.max(x)]
                     })
                 };
-                let most = 2.0 * inflation + thick.of(elements);
+                let most = 2.0 * inflation + of_both(&scene, elements);
                 let are_near = (0..3).all(|axis| {
                     let [[a_low, a_high], [b_low, b_high]] = [ends(axis, 0), ends(axis, 1)];
                     a_low - b_high <= most && b_low - a_high <= most
@@ -135,7 +114,7 @@ fn candidates_are_boxes_that_reach_by_the_thickness_too() {
                     PairKind::VertexVertex,
                 ];
                 let query = Query::all();
-                let found = (detector.candidates(&thick.scene, inflation, &query)).expect("good");
+                let found = (detector.candidates(&scene, inflation, &query)).expect("good");
                 let found = found.iter().map(|(kind, a, b)| {
                     let index = |body: BodyId| body.index() as u32;
                     (kind, [index(a.body), a.element, index(b.body), b.element])
@@ -259,29 +238,41 @@ fn sums_are_rounded_up() {
     }
 }
 
-/// Vertices stop before they are nearer than their elements are thick.
+/// Vertices stop before they are nearer than their elements are thick, pair by pair.
 #[test]
 fn vertices_stop_before_thick_elements() {
-    for is_double in [false, true] {
-        let (mut scene, bodies) = two_soups(is_double);
-        let n = scene.body(bodies[0]).expect("known").n_vertices();
-        let each = Vec::from_iter((0..n).map(|ix| [0.0, 0.01, 0.03][ix % 3]));
+    for (round, part) in PARTS.into_iter().cycle().take(6).enumerate() {
+        let (mut scene, bodies) = two_soups(round % 2 == 1);
+        let held = scene.body(bodies[0]).expect("known");
+        let n = match part {
+            Part::Vertices => held.n_vertices(),
+            _ => held.part(part).len(),
+        };
+        let each = Vec::from_iter((0..n).map(|ix| [0.0, 0.0078125, 0.03125][ix % 3]));
         scene
-            .set_thickness(bodies[0], Thickness::vertices(&each[..]))
+            .set_thickness(bodies[0], thickness(part, &each))
             .expect("good");
         let query = Query::between(bodies[0], bodies[1]);
-        let mut detector = detector(Method::Clusters, 2);
-        let near = |detector: &mut impinge_core::Detector, scene: &Scene| {
-            let near = detector.near(scene, 0.0, &query).expect("good");
-            Vec::from_iter(near.iter().map(|pair| (pair.kind, pair.row())))
-        };
-        let before = near(&mut detector, &scene);
-        let truncation = detector.truncate(&scene, &query).expect("good");
+        let mut of_all = detectors().map(|mut detector| {
+            let truncation = detector.truncate(&scene, &query);
+            truncation.expect("good")
+        });
+        let [truncation, others @ ..] = &mut of_all;
+        assert!(others.iter().all(|other| other == truncation), "{part:?}");
         assert!(truncation.n_cut() > 0);
-        truncation.apply(&mut scene).expect("the same bodies");
-        let after = near(&mut detector, &scene);
-        assert!(after.iter().all(|pair| before.contains(pair)));
-        assert!(after.len() < 10 * truncation.n_touching() as usize + 1);
+        for (body, at) in truncation.iter() {
+            scene.set_end_positions(body, at).expect("as many");
+        }
+        let met = contacts(&scene, |pair, elements, [start, end]| {
+            let is_asked = elements[0].0 != elements[1].0;
+            let kept = of_both(&scene, elements);
+            is_asked
+                .then(|| first_within(pair, start, end, kept))
+                .flatten()
+        });
+        // What touches at the start stays.
+        assert!(met.iter().all(|row| row.3), "{part:?}");
+        assert_eq!(met.len() as u64, truncation.n_touching(), "{part:?}");
     }
 }
 

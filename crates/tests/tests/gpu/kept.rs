@@ -6,9 +6,7 @@ use crate::caller::Caller;
 use crate::resident_steps::{Listed, listed, numbers, numbers_of};
 use crate::steps::{add_web, assert_alike, balls};
 
-use impinge_core::{
-    Backend, BodyId, Detector, Precision, Query, Scene, Settings, Start, Thickness,
-};
+use impinge_core::{Backend, Detector, Precision, Query, Scene, Settings, Start, Thickness};
 use impinge_scenes::{Random, surfaces};
 
 /// How far the elements of a step may be from each other for it to matter.
@@ -54,21 +52,28 @@ fn assert_kept(
     [impacts.len(), pairs.len(), n_near]
 }
 
-/// Gives the bodies of a scene a thickness each, or of each vertex, or none.
-fn thicken(scene: &mut Scene, random: &mut Random, most: f64) {
-    let bodies: Vec<(BodyId, usize)> = scene
-        .bodies()
-        .map(|(body, held)| (body, held.n_vertices()))
-        .collect();
+/// Gives the bodies of a scene a thickness each, or of each vertex, edge or face, or none; which of
+/// these is told by a number. Returns whether any is thick.
+fn thicken(scene: &mut Scene, random: &mut Random, most: f64, by: usize) -> bool {
+    let bodies = Vec::from_iter(scene.bodies().map(|(body, held)| {
+        let n = [held.n_vertices(), held.edges().len(), held.faces().len()];
+        (body, n)
+    }));
     for (body, n) in bodies {
-        let mut any = || most * f64::from(random.unit());
-        let thickness = match n % 3 {
-            0 => any().into(),
-            1 => Thickness::vertices(Vec::from_iter((0..n).map(|_| any()))),
+        let mut each = |n: usize| {
+            let any = || most * f64::from(random.unit());
+            Vec::from_iter(std::iter::repeat_with(any).take(n))
+        };
+        let thickness = match ((n[0] + by) % 3, by % 3) {
+            (0, _) => each(1)[0].into(),
+            (1, 0) => Thickness::vertices(each(n[0])),
+            (1, 1) => Thickness::edges(each(n[1])),
+            (1, _) => Thickness::faces(each(n[2])),
             _ => 0.0.into(),
         };
         scene.set_thickness(body, thickness).expect("good");
     }
+    scene.bodies().any(|(_, body)| body.thickness() > 0.0)
 }
 
 /// Small bodies of every kind that move: on a lattice, where much is degenerate, or at random.
@@ -126,8 +131,9 @@ fn steps_whose_elements_keep_a_distance_are_answered_alike() {
         let mut random = Random::new(seed + 100);
         let mut scene = small(seed);
         let separation = [0.0, 0.25, 1.0][seed as usize % 3];
+        let by = seed as usize + seed as usize / 3;
         if separation == 0.0 || seed % 2 == 0 {
-            thicken(&mut scene, &mut random, 0.2);
+            thicken(&mut scene, &mut random, 0.2, by);
         }
         check(&format!("small {seed}"), &scene, separation);
         let mut scene = Scene::new();
@@ -136,7 +142,8 @@ fn steps_whose_elements_keep_a_distance_are_answered_alike() {
             _ => add_web::<f64>(&mut scene, &mut random, 60, 7),
         };
         if separation == 0.0 {
-            thicken(&mut scene, &mut random, 0.5);
+            let is_thick = (by..).any(|by| thicken(&mut scene, &mut random, 0.5, by));
+            assert!(is_thick);
         }
         check(&format!("web {seed}"), &scene, separation);
     }
@@ -246,7 +253,7 @@ fn damaged_kernels_of_distances_that_are_kept_are_noticed() {
     for seed in 0..4 {
         let mut random = Random::new(seed);
         let mut scene = small(seed);
-        thicken(&mut scene, &mut random, 0.3);
+        thicken(&mut scene, &mut random, 0.3, 0);
         cases.push((scene, [0.0, 0.5][seed as usize % 2]));
     }
     let mut cloth = Scene::new();

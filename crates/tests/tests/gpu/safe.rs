@@ -7,10 +7,12 @@ use std::collections::BTreeMap;
 use crate::caller::Caller;
 use impinge_core::exact::{ElementPair, Point, are_within};
 use impinge_core::{
-    Backend, BodyId, Detector, Element, Error, PairKind, Query, Scene, Settings, Thickness, wgpu,
+    Backend, BodyId, Detector, Element, Error, PairKind, Part, Query, Scene, Settings, Thickness,
+    wgpu,
 };
 use impinge_scenes::{Model, Random, soup, surfaces};
 use impinge_testing::data::test_file;
+use impinge_tests::thickness_of;
 
 /// The bounds of each body.
 pub type Safe = BTreeMap<BodyId, Vec<f32>>;
@@ -62,7 +64,7 @@ pub fn safe_of(
 fn corners(scene: &Scene, kind: PairKind, side: usize, of: Element) -> (Vec<u32>, Vec<Point>) {
     let body = scene.body(of.body).expect("held");
     let corners = match kind.parts()[side] {
-        impinge_core::Part::Vertices => vec![of.element],
+        Part::Vertices => vec![of.element],
         part => body.part(part).corners(of.element as usize).to_vec(),
     };
     let point = |&corner: &u32| body.positions().point(corner as usize);
@@ -70,16 +72,11 @@ fn corners(scene: &Scene, kind: PairKind, side: usize, of: Element) -> (Vec<u32>
     (corners, points)
 }
 
-/// How thick an element is: as its thickest vertex.
-fn thickness_of(scene: &Scene, body: BodyId, corners: &[u32]) -> f64 {
-    let body = scene.body(body).expect("held");
-    match body.thickness_by_element() {
-        None => body.thickness(),
-        Some((_, each)) => {
-            let own = corners.iter().map(|&corner| each[corner as usize]);
-            own.fold(0.0, f64::max)
-        }
-    }
+/// How thick the device takes an element to be: as its thickest vertex, and a vertex as the thickest
+/// element beside it.
+fn thickness_of_vertices(scene: &Scene, body: BodyId, corners: &[u32]) -> f64 {
+    let of = |&vertex: &u32| thickness_of(scene, body, Part::Vertices, vertex);
+    corners.iter().map(of).fold(0.0, f64::max)
 }
 
 /// Holds the bounds against every pair that is near: together, two elements certainly move less
@@ -128,15 +125,24 @@ pub fn check_asked(
         for (to, from) in four.iter_mut().zip(all) {
             *to = *from;
         }
-        let thick = [0, 1].map(|side| thickness_of(scene, elements[side].body, &sides[side].0));
-        let thick = thick[0] + thick[1];
+        let parts = pair.kind.parts();
+        let [thick, as_vertices] = [false, true].map(|is_by_vertices| {
+            let of = [0, 1].map(|side| {
+                let (body, corners) = (elements[side].body, &sides[side].0);
+                match is_by_vertices {
+                    false => thickness_of(scene, body, parts[side], elements[side].element),
+                    true => thickness_of_vertices(scene, body, corners),
+                }
+            });
+            of[0] + of[1]
+        });
         // Both are floats in single precision: their sum is exact, but for very different ones.
         let sum = (moves[0] + moves[1]).next_up() + thick;
         if are_within(test, &four, if moves == [0.0; 2] { thick } else { sum }) {
             assert_eq!(moves, [0.0; 2], "{name}: {pair:?}");
             n_touching += 1;
         }
-        let distance = (pair.distance.expect("asked for") - thick).max(0.0);
+        let distance = (pair.distance.expect("asked for") - as_vertices).max(0.0);
         let are_fixed = elements.map(|of| fixed.contains(&of.body));
         for side in 0..2 {
             let share = match are_fixed {
@@ -264,23 +270,28 @@ fn together_two_elements_move_less_than_they_are_apart() {
     );
 }
 
-/// Bodies with a thickness each, or of each vertex, one after the other on one detector.
+/// Bodies with a thickness each, or of each vertex, edge or face, one after the other on one detector.
 #[test]
 fn how_thick_elements_are_is_taken_from_their_distance() {
     let caller = Caller::new();
     let mut detector = caller.detector(Settings::default());
     let (mut n_touching, mut n_bounded) = (0, 0);
-    for seed in 0..24 {
+    for seed in 0..36 {
         let (scene, bodies) = small(seed, seed % 2 == 0);
         let mut truth = scene.clone();
         let mut random = Random::new(seed);
         for (ix, (body, at)) in bodies.iter().enumerate() {
             truth.set_positions(*body, at).expect("good");
             let mut any = || 0.1 * f64::from(random.unit());
-            let thickness = match (ix as u64 + seed) % 4 {
+            let held = truth.body(*body).expect("held");
+            let (n_edges, n_faces) = (held.edges().len(), held.faces().len());
+            let mut each = |n: usize| Vec::from_iter((0..n).map(|_| any()));
+            let thickness = match (ix as u64 + seed / 2) % 6 {
                 0 => 0.0.into(),
-                1 => any().into(),
-                _ => Thickness::vertices(Vec::from_iter(at.iter().map(|_| any()))),
+                1 => each(1)[0].into(),
+                2 | 3 => Thickness::vertices(each(at.len())),
+                4 => Thickness::edges(each(n_edges)),
+                _ => Thickness::faces(each(n_faces)),
             };
             truth.set_thickness(*body, thickness).expect("good");
         }
@@ -298,7 +309,7 @@ fn how_thick_elements_are_is_taken_from_their_distance() {
     // A thickness of each face is that of its vertices, and nothing is thick afterwards.
     let mut scene = alone(&surfaces::ball(300));
     let (body, held) = scene.bodies().next().expect("one");
-    let faces = vec![0.02; held.part(impinge_core::Part::Faces).len()];
+    let faces = vec![0.02; held.part(Part::Faces).len()];
     let mut ask = |scene: &Scene| safe_of(&caller, &mut detector, scene, 0.1, &Query::all(), &[]);
     let thin = ask(&scene);
     scene.set_thickness(body, 0.02).expect("good");
