@@ -3,7 +3,8 @@
 use super::near::{PARTS, thickness};
 use impinge_core::exact::{ElementPair, Point, are_within, closest_points, edge_face_are_within};
 use impinge_core::{
-    BodyId, Bounds, Csr, Elements, Error, Method, PairKind, Part, Query, SafeDistances, Scene,
+    BodyId, Bounds, Csr, Elements, Error, Exclusion, Method, PairKind, Part, Positions, Query,
+    SafeDistances, Scene,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
 use impinge_tests::{detector, detectors, thickness_of};
@@ -460,19 +461,35 @@ fn bounds_hold_on_surfaces() {
     assert!(n_bounded > 100, "{n_bounded}");
 }
 
-/// Moves every vertex as far as it may, but for rounding, in random directions.
-fn moved(scene: &Scene, safe: &SafeDistances, body: BodyId, random: &mut Random) -> Vec<[f64; 3]> {
+/// Moves every vertex as far as it may in random directions: where it is as it is stored, rounding
+/// included, is not farther from its start.
+fn moved(scene: &Scene, safe: &SafeDistances, body: BodyId, random: &mut Random) -> Positions {
     let held = scene.body(body).expect("held");
     let bounds = safe.of(body).expect("held");
-    (0..held.n_vertices())
-        .map(|ix| {
-            let by = random.point(-1.0, 1.0).map(f64::from);
-            let length = by.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
-            let scale = bounds.get(ix) * (1.0 - 1e-9) / length;
-            let at = held.positions().point(ix);
-            [0, 1, 2].map(|axis| at[axis] + by[axis] * scale)
-        })
-        .collect()
+    let is_single = matches!(held.positions(), Positions::F32(_));
+    let round = |x: f64| match is_single {
+        true => f64::from(x as f32),
+        false => x,
+    };
+    let ends = Vec::from_iter((0..held.n_vertices()).map(|ix| {
+        let by = random.point(-1.0, 1.0).map(f64::from);
+        let length = by.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
+        let (start, bound) = (held.positions().point(ix), bounds.get(ix));
+        let shares = [1.0, 1.0 - 1e-9, 1.0 - 1e-4, 0.99, 0.9, 0.5, 0.0].into_iter();
+        let mut ends = shares.map(|share| {
+            let scale = share * bound / length;
+            [0, 1, 2].map(|axis| round(start[axis] + by[axis] * scale))
+        });
+        let is_near = |end: &Point| {
+            let four = [start, *end, [0.0; 3], [0.0; 3]];
+            are_within(ElementPair::VertexVertex, &four, bound)
+        };
+        ends.find(is_near).expect("its start is near")
+    }));
+    match is_single {
+        true => Vec::from_iter(ends.iter().map(|p| p.map(|x| x as f32))).into(),
+        false => ends.into(),
+    }
 }
 
 #[test]
@@ -511,60 +528,101 @@ fn what_moves_within_its_bounds_never_touches() {
 }
 
 /// On any path: from the same start, vertices go from place to place within their bounds, straight
-/// and with corners, each time as far as they may.
+/// and with corners, each time as far as they may. In either precision, with elements that are
+/// thick, bodies that are fixed, and groups that do not meet.
 #[test]
 fn paths_with_corners_within_the_bounds_never_touch() {
     let mut random = Random::new(29);
     let mut detector = detector(Method::Clusters, 2);
-    let query = Query::all();
-    let (mut n_ways, mut n_far) = (0, 0);
-    for round in 0..8 {
+    let (mut n_ways, mut n_far, mut n_left_out) = (0, [0; 2], 0);
+    for round in 0..12 {
         // Two crumpled layers with a ball between them.
         let mut scene = Scene::new();
         let layers =
             [-0.6, 0.6].map(|height| surfaces::cloth(8, 8, 0.15).translated([-0.6, -0.6, height]));
         let models = layers.into_iter().chain([surfaces::bumpy_ball(200, 0.3)]);
-        let mut starts = Vec::new();
-        for (model, most) in models.zip([0.05, 0.05, 0.003]) {
-            let crumpled = model.positions.iter().map(|p| {
+        let are_single = match round % 3 {
+            0 => [false; 3],
+            1 => [true; 3],
+            _ => [true, false, true],
+        };
+        let mut bodies = Vec::new();
+        for ((model, most), is_single) in models.zip([0.05, 0.05, 0.003]).zip(are_single) {
+            let crumpled = Vec::from_iter(model.positions.iter().map(|p| {
                 let q = random.point(-most, most);
-                [0, 1, 2].map(|k: usize| f64::from(p[k] + q[k]))
-            });
-            let start = Vec::from_iter(crumpled);
-            let body = scene
-                .add((model.elements.clone(), start.clone()))
-                .expect("good");
-            starts.push((body, start));
+                [0, 1, 2].map(|k: usize| p[k] + q[k])
+            }));
+            let wide = || Vec::from_iter(crumpled.iter().map(|p| p.map(f64::from)));
+            let body = match is_single {
+                true => scene.add((model.elements.clone(), crumpled)),
+                false => scene.add((model.elements.clone(), wide())),
+            };
+            bodies.push(body.expect("good"));
         }
-        let most = [0.02, 0.1, 1.0][round % 3];
+        if round % 4 > 0 {
+            scene.set_thickness(bodies[2], 0.001).expect("good");
+            let part = PARTS[round % 4 - 1];
+            set_each(&mut scene, bodies[0], part, |ix| 0.002 * (ix % 3) as f64);
+        }
+        let fixed = match round % 5 {
+            3 => vec![bodies[2]],
+            4 => vec![bodies[0], bodies[1]],
+            _ => vec![],
+        };
+        let mut query = Query::all().fixed(fixed);
+        if round % 2 == 1 {
+            for (ix, &body) in bodies.iter().enumerate() {
+                let at = scene.body(body).expect("held").positions();
+                // One half of each layer may go through the ball, and through itself.
+                let group = |v: usize| {
+                    if ix == 2 {
+                        2
+                    } else {
+                        u32::from(at.point(v)[0] > 0.0)
+                    }
+                };
+                let groups = Vec::from_iter((0..at.len()).map(group));
+                scene.set_groups(body, &groups).expect("good");
+            }
+            query = query
+                .exclude(Exclusion::groups(1, 2))
+                .exclude(Exclusion::groups(1, 1));
+        }
+        let most = [0.02, 0.1, 1.0][round / 3 % 3];
         let safe = detector.safe_distances(&scene, most, &query).expect("good");
         assert!(safe.touching().is_empty());
         let first = scene.clone();
         for _ in 0..10 {
-            for (body, _) in &starts {
-                let end = moved(&first, &safe, *body, &mut random);
-                let from = scene.body(*body).expect("held").positions();
-                n_far += (0..end.len())
+            for &body in &bodies {
+                let end = moved(&first, &safe, body, &mut random);
+                let held = scene.body(body).expect("held");
+                let (from, is_single) = (held.positions(), matches!(end, Positions::F32(_)));
+                n_far[usize::from(is_single)] += (0..end.len())
                     .filter(|&ix| {
-                        let bound = safe.of(*body).expect("held").get(ix);
-                        let way = [0, 1, 2].map(|k: usize| end[ix][k] - from.point(ix)[k]);
+                        let bound = safe.of(body).expect("held").get(ix);
+                        let way = [0, 1, 2].map(|k: usize| end.point(ix)[k] - from.point(ix)[k]);
                         way.iter().map(|x| x * x).sum::<f64>().sqrt() > 1.5 * bound
                     })
                     .count();
-                scene.set_end_positions(*body, end).expect("good");
+                scene.set_end_positions(body, end).expect("good");
             }
-            assert!(detector.is_free(&scene, &query).expect("good"));
+            assert!(detector.is_free(&scene, &query).expect("good"), "{round}");
+            let all = detector.is_free(&scene, &Query::all()).expect("good");
+            n_left_out += usize::from(!all);
             n_ways += 1;
-            for (body, _) in &starts {
-                let end = scene.body(*body).expect("held").end_positions().cloned();
+            for &body in &bodies {
+                let end = scene.body(body).expect("held").end_positions().cloned();
                 let end = end.expect("it moves");
-                scene.set_positions(*body, end).expect("good");
-                scene.clear_end_positions(*body).expect("good");
+                scene.set_positions(body, end).expect("good");
+                scene.clear_end_positions(body).expect("good");
             }
         }
     }
     // Many go farther at once than from their starts.
-    assert!(n_ways == 80 && n_far > 1000, "{n_far}");
+    assert!(
+        n_ways == 120 && n_far.iter().all(|&n| n > 1000) && n_left_out > 0,
+        "{n_far:?} {n_left_out}"
+    );
 }
 
 /// A list as `(row, column)` pairs.
