@@ -3,12 +3,15 @@
 
 use dashu_int::IBig;
 
-use super::safe::{Held, elements, pairs, points, scene};
-use impinge_core::exact::{Point, edge_face_are_within};
-use impinge_core::{BodyId, Exclusion, PairKind, Part, Query, SafeDistances, Scene};
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::near::PARTS;
+use super::safe::{Held, elements, pairs, points, scene, set_each};
+use impinge_core::exact::Point;
+use impinge_core::{BodyId, Bounds, Exclusion, PairKind, Part, Query, SafeDistances, Scene};
 use impinge_scenes::Random;
 use impinge_testing::data::test_file;
-use impinge_tests::detectors;
+use impinge_tests::{detectors, thickness_of};
 
 type Vector = [IBig; 3];
 
@@ -124,6 +127,63 @@ fn distance(kind: PairKind, a: &[Point], b: &[Point]) -> Square {
     }
 }
 
+/// Whether an edge and a face share a point: an end on the face, a side of the face that meets the
+/// edge, or the ends on either side of the plane and all corners on one side of the edge's line.
+fn meet(edge: &[Point], face: &[Point]) -> bool {
+    let [edge, face] =
+        [edge, face].map(|points| Vec::from_iter(points.iter().map(|p| p.map(whole))));
+    let ([p, q], [a, b, c]) = ([&edge[0], &edge[1]], [&face[0], &face[1], &face[2]]);
+    let touches = |square: Square| square.0 == IBig::ZERO;
+    if [p, q]
+        .into_iter()
+        .any(|end| touches(of_point_triangle(end, [a, b, c])))
+        || [[a, b], [b, c], [c, a]]
+            .into_iter()
+            .any(|side| touches(of_segments([p, q], side)))
+    {
+        return true;
+    }
+    let normal = cross(&minus(b, a), &minus(c, a));
+    let way = minus(q, p);
+    let corners = [a, b, c].map(|corner| minus(corner, p));
+    let turns = [(0, 1), (1, 2), (2, 0)]
+        .map(|(from, to): (usize, usize)| dot(&way, &cross(&corners[from], &corners[to])));
+    let are = |sign: fn(&IBig) -> bool| turns.iter().all(sign);
+    let heights = [p, q].map(|end| dot(&minus(end, a), &normal));
+    &heights[0] * &heights[1] < IBig::ZERO && (are(|x| *x > IBig::ZERO) || are(|x| *x < IBig::ZERO))
+}
+
+#[test]
+fn known_edges_meet_a_face() {
+    let face = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let flat = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
+    for (edge, face, expected) in [
+        ([[1.0, 1.0, -1.0], [1.0, 1.0, 1.0]], &face, true),
+        ([[1.0, 1.0, 1.0], [1.0, 1.0, -1.0]], &face, true),
+        ([[3.0, 3.0, -1.0], [3.0, 3.0, 1.0]], &face, false),
+        ([[1.0, 1.0, 1.0], [1.0, 1.0, 2.0]], &face, false),
+        // An end on the face, on a side, on a corner.
+        ([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0]], &face, true),
+        ([[2.0, 2.0, 0.0], [3.0, 3.0, 1.0]], &face, true),
+        ([[4.0, 0.0, 0.0], [5.0, 0.0, 1.0]], &face, true),
+        // Through a side, through a corner, past it.
+        ([[2.0, 2.0, -1.0], [2.0, 2.0, 1.0]], &face, true),
+        ([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], &face, true),
+        ([[-0.5, -0.5, -1.0], [-0.5, -0.5, 1.0]], &face, false),
+        // In its plane: across it, within it, beside it.
+        ([[-1.0, 1.0, 0.0], [9.0, 1.0, 0.0]], &face, true),
+        ([[0.5, 0.5, 0.0], [1.0, 1.0, 0.0]], &face, true),
+        ([[3.0, 3.0, 0.0], [9.0, 3.0, 0.0]], &face, false),
+        // A face that is a segment, and an edge that is a point.
+        ([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]], &flat, true),
+        ([[1.0, -1.0, 1.0], [1.0, 1.0, 1.0]], &flat, false),
+        ([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0]], &face, true),
+        ([[1.0, 1.0, 0.5], [1.0, 1.0, 0.5]], &face, false),
+    ] {
+        assert_eq!(meet(&edge, face), expected, "{edge:?} {face:?}");
+    }
+}
+
 #[test]
 fn known_distances_are_those() {
     let three = |x: f64, y: f64, z: f64| [x, y, z];
@@ -172,15 +232,14 @@ fn known_distances_are_those() {
     assert_eq!(n * IBig::from(3), &unit * &unit * d);
 }
 
-/// Holds the bounds against pairs, given with whether the question is about them. Returns how many
-/// touch, and how many vertices have less than the most.
+/// Holds the bounds against the pairs that a question is about, given one by one.
 struct Check<'a> {
     scene: &'a Scene,
     safe: &'a SafeDistances,
     most: f64,
     fixed: &'a [BodyId],
     /// For each vertex, whether a pair says why it may not go farther.
-    reasons: std::collections::BTreeMap<(BodyId, u32), bool>,
+    reasons: BTreeMap<(BodyId, u32), bool>,
     n_touching: usize,
 }
 
@@ -194,16 +253,15 @@ impl Check<'_> {
         own.fold(0.0, f64::max)
     }
 
-    fn thickness(&self, body: BodyId) -> f64 {
-        self.scene.body(body).expect("held").thickness()
+    fn thickness(&self, of: &Held) -> IBig {
+        whole(thickness_of(self.scene, of.body, of.part, of.element))
     }
 
     /// Together, both move less than they are apart; or neither moves.
     fn pair(&mut self, kind: PairKind, a: &Held, b: &Held) {
         let square = distance(kind, &points(self.scene, a), &points(self.scene, b));
         let moves = [a, b].map(|of| whole(self.largest(of)));
-        let thick = [a, b].map(|of| whole(self.thickness(of.body)));
-        let thick: IBig = thick.into_iter().sum();
+        let thick = self.thickness(a) + self.thickness(b);
         let [x, y] = &moves;
         let is_safe = square.is_above(&(x + y + &thick));
         let stays = moves.iter().all(|of| *of == IBig::ZERO);
@@ -226,17 +284,43 @@ impl Check<'_> {
         }
     }
 
-    /// Every vertex that may not go as far as any has a reason. Returns how many have.
+    /// An edge and a face that meet stay where they are. Returns whether they do meet.
+    fn edge_face(&mut self, e: &Held, f: &Held) -> bool {
+        let meets = meet(&points(self.scene, e), &points(self.scene, f));
+        if meets {
+            for of in [e, f] {
+                assert_eq!(self.largest(of), 0.0, "{e:?} {f:?}");
+                let own = of.corners.iter().map(|&corner| (of.body, corner));
+                self.reasons.extend(own.map(|vertex| (vertex, true)));
+            }
+        }
+        meets
+    }
+
+    /// Every vertex may go as far as any, exactly, or has a reason. Returns how many have one.
     fn end(&self) -> usize {
         let mut n_bounded = 0;
-        for (&(body, vertex), &has_reason) in &self.reasons {
+        let bodies = self.scene.bodies();
+        let vertices =
+            bodies.flat_map(|(id, body)| (0..body.n_vertices() as u32).map(move |v| (id, v)));
+        for (body, vertex) in vertices {
+            let has_reason = self.reasons.get(&(body, vertex)) == Some(&true);
             let bound = self.bound(body, vertex);
             let is_fixed = self.fixed.contains(&body);
-            let is_whole = bound >= self.most * (1.0 - 1e-6);
-            assert!(
-                bound <= self.most && (has_reason || is_fixed || is_whole),
-                "{vertex} {bound}"
-            );
+            // In the precision of the body, rounded down.
+            let whole = match self.safe.of(body) {
+                Some(Bounds::F32(_)) if f64::from(self.most as f32) > self.most => {
+                    f64::from((self.most as f32).next_down())
+                }
+                Some(Bounds::F32(_)) => f64::from(self.most as f32),
+                _ => self.most,
+            };
+            let is_whole = bound == whole;
+            assert!(bound <= self.most, "{vertex} {bound}");
+            match is_fixed {
+                true => assert_eq!(bound, 0.0, "{vertex}"),
+                false => assert!(has_reason || is_whole, "{vertex} {bound}"),
+            }
             n_bounded += usize::from(!is_whole && !is_fixed);
         }
         n_bounded
@@ -270,8 +354,8 @@ fn slanted(seed: u64) -> (Scene, Vec<BodyId>) {
 
 #[test]
 fn bounds_of_small_scenes_hold_as_rational_numbers() {
-    let [mut n_touching, mut n_bounded, mut n_left_out] = [0; 3];
-    let [mut detector, ..] = detectors();
+    let [mut n_touching, mut n_meeting, mut n_bounded, mut n_left_out] = [0; 4];
+    let mut detectors = detectors();
     for seed in 0..60 {
         let (mut scene, bodies) = match seed % 3 {
             0 => scene(seed, false, seed % 2 == 0),
@@ -285,6 +369,11 @@ fn bounds_of_small_scenes_hold_as_rational_numbers() {
         if seed % 5 == 4 {
             scene.set_thickness(bodies[0], 0.1).expect("good");
             scene.set_thickness(bodies[2], 0.03).expect("good");
+        }
+        if seed % 5 == 3 {
+            let part = PARTS[seed as usize / 5 % 3];
+            set_each(&mut scene, bodies[0], part, |ix| 0.1 / (1 + ix % 4) as f64);
+            set_each(&mut scene, bodies[1], part, |ix| 0.03 * (ix % 3) as f64);
         }
         let mut random = Random::new(seed);
         for (ix, &body) in bodies.iter().enumerate() {
@@ -309,6 +398,7 @@ fn bounds_of_small_scenes_hold_as_rational_numbers() {
             .exclude(Exclusion::groups(0, 2));
         for (query, is_grouped) in [(all, false), (grouped, true)] {
             let query = query.exclude((bodies[3], bodies[2]));
+            let detector = &mut detectors[seed as usize % 4];
             let safe = detector.safe_distances(&scene, most, &query).expect("good");
             let mut check = Check {
                 scene: &scene,
@@ -335,21 +425,12 @@ fn bounds_of_small_scenes_hold_as_rational_numbers() {
                     n_left_out += 1;
                 }
             }
-            // Edges that pierce faces hold their vertices.
             for e in elements(&scene, Part::Edges) {
                 for f in elements(&scene, Part::Faces) {
                     let shares =
                         e.body == f.body && e.corners.iter().any(|c| f.corners.contains(c));
-                    let (ends, face) = (points(&scene, &e), points(&scene, &f));
-                    let face = [face[0], face[1], face[2]];
-                    if !shares
-                        && counts(&e, &f)
-                        && edge_face_are_within(&[ends[0], ends[1]], &face, 0.0)
-                    {
-                        for of in [&e, &f] {
-                            let own = of.corners.iter().map(|&corner| (of.body, corner));
-                            check.reasons.extend(own.map(|vertex| (vertex, true)));
-                        }
+                    if !shares && counts(&e, &f) {
+                        n_meeting += usize::from(check.edge_face(&e, &f));
                     }
                 }
             }
@@ -358,8 +439,8 @@ fn bounds_of_small_scenes_hold_as_rational_numbers() {
         }
     }
     assert!(
-        n_touching > 1000 && n_bounded > 300 && n_left_out > 5000,
-        "{n_touching} {n_bounded} {n_left_out}"
+        n_touching > 1000 && n_meeting > 300 && n_bounded > 300 && n_left_out > 5000,
+        "{n_touching} {n_meeting} {n_bounded} {n_left_out}"
     );
 }
 
@@ -419,24 +500,24 @@ fn bounds_of_a_real_frame_hold_as_rational_numbers() {
         let [of_a, of_b] = kind.parts();
         check.pair(kind, &held(of_a, a.element), &held(of_b, b.element));
     }
-    // The frame intersects itself in places.
-    for pair in safe.touching().of(PairKind::EdgeFace) {
-        let [e, f] = [
-            held(Part::Edges, pair.a.element),
-            held(Part::Faces, pair.b.element),
-        ];
-        let (ends, face) = (points(&scene, &e), points(&scene, &f));
-        let face = [face[0], face[1], face[2]];
-        assert!(edge_face_are_within(&[ends[0], ends[1]], &face, 0.0));
-        for of in [&e, &f] {
-            let own = of.corners.iter().map(|&corner| (of.body, corner));
-            check.reasons.extend(own.map(|vertex| (vertex, true)));
+    // The frame intersects itself in places: the same as are named.
+    let mut meeting = BTreeSet::new();
+    let crossing = query.kinds([PairKind::EdgeFace]);
+    let crossing = detector.candidates(&scene, 0.0, &crossing).expect("good");
+    for (_, e, f) in crossing.iter() {
+        let [of_e, of_f] = [held(Part::Edges, e.element), held(Part::Faces, f.element)];
+        if check.edge_face(&of_e, &of_f) {
+            meeting.insert([e.element, f.element]);
         }
     }
+    let named = safe.touching().of(PairKind::EdgeFace);
+    let named = BTreeSet::from_iter(named.map(|pair| [pair.a.element, pair.b.element]));
+    assert_eq!(meeting, named);
     let n_bounded = check.end();
     assert!(
         near.len() > 10_000 && n_bounded > 1000,
         "{} {n_bounded}",
         near.len()
     );
+    assert!(!meeting.is_empty());
 }
