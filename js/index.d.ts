@@ -167,7 +167,7 @@ export interface Query extends Control {
    * what stands still there is a body without end positions.
    */
   fixed?: readonly Body[];
-  /** `cast`: the first hit of each ray (the default), whether there is any, or all. */
+  /** `cast`: the first hit of each ray (`"first"`, the default), whether there is any, or all. */
   hits?: "first" | "any" | "all";
   /** `closest`: how many nearest elements of each point, 1 by default. */
   nNearest?: number;
