@@ -80,7 +80,7 @@ impl impinge_candidates {
         reserve(&mut rows, n, "candidates")?;
         reserve(&mut kinds, n, "candidates")?;
         for kind in PairKind::ALL {
-            rows.extend(candidates.rows(kind).map(impinge_pair::from));
+            rows.extend(candidates.rows_of(kind).map(impinge_pair::from));
             kinds.resize(rows.len(), bit(kind) as u8);
         }
         Ok(impinge_candidates {

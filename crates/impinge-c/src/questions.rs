@@ -287,7 +287,7 @@ pub unsafe extern "C" fn impinge_find_candidates_in_runs(
             let hand_out = |run: impinge::Candidates| {
                 for kind in PairKind::ALL {
                     rows.clear();
-                    let of_kind = run.rows(kind);
+                    let of_kind = run.rows_of(kind);
                     if let Err(failure) = reserve(&mut rows, of_kind.len(), "candidates") {
                         return ControlFlow::Break(Err(failure));
                     }

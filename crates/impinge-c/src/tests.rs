@@ -392,6 +392,13 @@ fn assert_hashes(backend: u32) {
                 impinge_hash_impacts(impinge_impacts_data(impacts), n),
                 expected.hash()
             );
+            for (ix, expected) in expected.rows().enumerate() {
+                let row = &*impinge_impacts_data(impacts).add(ix);
+                assert_eq!(
+                    [row.body_a, row.element_a, row.body_b, row.element_b],
+                    expected
+                );
+            }
             impinge_impacts_destroy(impacts);
 
             let mut candidates = null_mut();
@@ -406,14 +413,11 @@ fn assert_hashes(backend: u32) {
                 expected.hash(),
                 "{name}"
             );
-            let rows = PairKind::ALL
-                .into_iter()
-                .flat_map(|kind| expected.rows(kind));
             let given = std::slice::from_raw_parts(
                 impinge_candidates_data(candidates),
                 impinge_candidates_count(candidates),
             );
-            assert!(rows.eq(given.iter().map(|row| row.row())));
+            assert!(expected.rows().eq(given.iter().map(|row| row.row())));
             impinge_candidates_destroy(candidates);
 
             let mut near = null_mut();
@@ -422,6 +426,9 @@ fn assert_hashes(backend: u32) {
             let expected = expected.expect("near pairs");
             assert_eq!(impinge_near_hash(near), expected.hash(), "{name}");
             assert_eq!(impinge_near_count(near), expected.len());
+            for (ix, expected) in expected.rows().enumerate() {
+                assert_eq!((*impinge_near_data(near).add(ix)).row(), expected);
+            }
             impinge_near_destroy(near);
 
             // Pairs at the start allow no step, or are seams: both say the same.

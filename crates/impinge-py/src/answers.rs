@@ -520,7 +520,7 @@ impl Candidates {
 
     fn all(&self) -> impl Iterator<Item = (PairKind, [u32; 4])> + '_ {
         self.own()
-            .flat_map(|kind| self.inner.rows(kind).map(move |row| (kind, row)))
+            .flat_map(|kind| self.inner.rows_of(kind).map(move |row| (kind, row)))
     }
 }
 

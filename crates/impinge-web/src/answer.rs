@@ -100,7 +100,7 @@ impl Answer {
             hash: near.hash(),
             ..Answer::default()
         };
-        answer.add_rows(near.iter().map(|pair| pair.row()), world.numbers());
+        answer.add_rows(near.rows(), world.numbers());
         let bytes = &mut answer.bytes;
         bytes.extend(near.iter().map(|pair| pair.kind as u8));
         bytes.extend(near.iter().flat_map(|pair| pair.features.map(code)));
@@ -148,7 +148,7 @@ impl Answer {
             ..Answer::default()
         };
         for kind in PairKind::ALL {
-            let rows = candidates.rows(kind);
+            let rows = candidates.rows_of(kind);
             let n = answer.bytes.len() + rows.len();
             answer.bytes.resize(n, kind as u8);
             answer.add_rows(rows, world.numbers());

@@ -86,8 +86,9 @@ fn points_and_rays_are_those_of_rust() {
                 assert_eq!(impinge_hits_n_rays(found), at.len());
                 assert_eq!(impinge_hits_count(found), expected.iter().len());
                 let rows = impinge_hits_data(found);
-                for (ix, hit) in expected.iter().enumerate() {
+                for (ix, (hit, of)) in expected.iter().zip(expected.rows()).enumerate() {
                     let row = &*rows.add(ix);
+                    assert_eq!([row.body, row.element], of);
                     assert_eq!((row.t, row.t_end), (hit.t, hit.t_end));
                     assert_eq!(row.barycentrics, hit.barycentrics);
                 }

@@ -233,7 +233,7 @@ fn expected_candidates(kinds: &[PairKind], distance: f64) -> (Vec<(String, [u32;
     let candidates = detector.candidates(&scene, distance, &query).unwrap();
     let rows = kinds.iter().flat_map(|&kind| {
         candidates
-            .rows(kind)
+            .rows_of(kind)
             .map(move |row| (kind.name().to_owned(), row))
     });
     (rows.collect(), candidates.hash())

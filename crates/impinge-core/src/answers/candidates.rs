@@ -78,9 +78,14 @@ impl Candidates {
         keys.map(|&key| self.numbering.pair(key))
     }
 
-    /// Rows `[body_a, element_a, body_b, element_b]` of one kind, with bodies by their
+    /// Rows `[body_a, element_a, body_b, element_b]`, with bodies by their
     /// [`index`](BodyId::index).
-    pub fn rows(&self, kind: PairKind) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
+    pub fn rows(&self) -> impl Iterator<Item = [u32; 4]> + '_ {
+        self.iter().map(|(_, a, b)| row(a, b))
+    }
+
+    /// The rows of one kind.
+    pub fn rows_of(&self, kind: PairKind) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
         self.of(kind).map(|(a, b)| row(a, b))
     }
 
@@ -98,7 +103,7 @@ impl Candidates {
 
     /// The hash of the candidates of one kind; [`hash`](Candidates::hash) is the sum of these.
     pub fn hash_of(&self, kind: PairKind) -> u64 {
-        Self::hash_rows(kind, self.rows(kind))
+        Self::hash_rows(kind, self.rows_of(kind))
     }
 
     /// The hash of candidates of one kind that have these rows.

@@ -78,6 +78,13 @@ impl Hits {
         self.found.iter()
     }
 
+    /// Rows `[body, element]` of the hits of all rays, with bodies by their
+    /// [`index`](crate::BodyId::index).
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = [u32; 2]> + '_ {
+        self.iter()
+            .map(|hit| [hit.element.body.slot(), hit.element.element])
+    }
+
     /// Where the hits of each ray start among all, and the end of the last.
     pub fn offsets(&self) -> &[usize] {
         &self.offsets

@@ -205,6 +205,12 @@ impl Impacts {
         self.impacts.iter()
     }
 
+    /// Rows `[body_a, element_a, body_b, element_b]`, with bodies by their
+    /// [`index`](BodyId::index).
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
+        self.iter().map(Impact::row)
+    }
+
     /// The impacts of one kind.
     pub fn of(&self, kind: PairKind) -> &[Impact] {
         let start = self.impacts.partition_point(|impact| impact.kind < kind);

@@ -114,7 +114,7 @@ impl Exclusion {
     /// let points = scene.add_points(&[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])?;
     /// let query = Query::all().exclude(Exclusion::vertices(points, points, [0, 1, 1, 1], [1]));
     /// let near = Detector::new(Backend::Cpu)?.near(&scene, 1.0, &query)?;
-    /// assert_eq!(near.iter().map(|pair| pair.row()).collect::<Vec<_>>(), [[0, 1, 0, 2]]);
+    /// assert_eq!(near.rows().collect::<Vec<_>>(), [[0, 1, 0, 2]]);
     /// # Ok(()) }
     /// ```
     pub fn vertices(

@@ -283,7 +283,7 @@ impl Scene {
     /// scene.set_thickness(points, Thickness::vertices(&[0.75, 0.25, 0.5][..]))?;
     /// let near = Detector::new(Backend::Cpu)?.near(&scene, 0.0, &Query::all())?;
     /// // 0.75 + 0.25 reaches over 1, 0.25 + 0.5 does not, and 0.75 + 0.5 not over 2.
-    /// assert_eq!(near.iter().map(|pair| pair.row()).collect::<Vec<_>>(), [[0, 0, 0, 1]]);
+    /// assert_eq!(near.rows().collect::<Vec<_>>(), [[0, 0, 0, 1]]);
     /// # Ok(()) }
     /// ```
     ///

@@ -30,7 +30,7 @@ impl Scene {
     /// let query = Query::between_all().kinds([PairKind::EdgeEdge]);
     /// let near = Detector::new(Backend::Cpu)?.near(&scene, 0.25, &query)?;
     /// // The strand passes over the edge between vertices 0 and 1, which is row 2.
-    /// assert_eq!(near.iter().map(|pair| pair.row()).collect::<Vec<_>>(), [[0, 2, 1, 0]]);
+    /// assert_eq!(near.rows().collect::<Vec<_>>(), [[0, 2, 1, 0]]);
     /// # Ok(()) }
     /// ```
     ///

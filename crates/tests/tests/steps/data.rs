@@ -214,7 +214,7 @@ fn boxes_overlap_as_often_as_others_counted() {
                 scenario.name
             );
         }
-        let rows: Vec<_> = candidates.rows(PairKind::EdgeEdge).collect();
+        let rows: Vec<_> = candidates.rows_of(PairKind::EdgeEdge).collect();
         assert!(rows.is_sorted_by(|a, b| a < b), "sorted, each once");
         // Run by run, within a budget that does not hold all of them.
         let all: Vec<_> = candidates.iter().collect();

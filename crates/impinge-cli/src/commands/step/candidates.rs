@@ -65,7 +65,7 @@ fn named<'a>(
     run: &'a Candidates,
     kind: PairKind,
 ) -> impl Iterator<Item = [u32; 4]> + 'a {
-    run.rows(kind).map(move |row| origins.row(kind, row))
+    run.rows_of(kind).map(move |row| origins.row(kind, row))
 }
 
 fn cells<'a>(

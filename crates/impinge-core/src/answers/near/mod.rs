@@ -235,6 +235,12 @@ impl NearPairs {
         }
     }
 
+    /// Rows `[body_a, element_a, body_b, element_b]`, with bodies by their
+    /// [`index`](crate::BodyId::index).
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
+        self.iter().map(|pair| pair.row())
+    }
+
     /// Those of one kind.
     pub fn of(&self, kind: PairKind) -> NearIter<'_> {
         NearIter {
