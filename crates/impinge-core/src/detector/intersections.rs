@@ -109,12 +109,8 @@ impl Detector {
         let any = self.distances.any(scene, plan, Work { workers, control })?;
         if any.is_some() {
             // One thread has found it, without the loop.
-            let stats = &mut self.stats;
-            stats.clear();
-            stats.method = Method::Clusters.name();
-            stats.backend.push_str("cpu");
-            stats.n_threads = 1;
-            stats.total_ms = plan.since.elapsed().as_secs_f64() * 1e3;
+            self.stats.begin(Method::Clusters.name(), "cpu", 1);
+            self.stats.total_ms = plan.since.elapsed().as_secs_f64() * 1e3;
         }
         Ok(any)
     }

@@ -153,11 +153,8 @@ impl Runner {
         find: impl FnOnce(&Workers, &mut Stats) -> Result<A, Error>,
     ) -> Result<A, Error> {
         let start = Instant::now();
-        stats.clear();
         // Trees of clusters serve all of these.
-        stats.method = Method::Clusters.name();
-        stats.n_threads = self.workers.n();
-        stats.backend.push_str("cpu");
+        stats.begin(Method::Clusters.name(), "cpu", self.workers.n());
         let answer = find(&self.workers, stats)?;
         self.workers.report(&mut stats.ways);
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -193,9 +190,7 @@ impl Runner {
         let answer = Answer::new(plan.limits, plan.held(), outcome.take_buffers());
         let answer = Arc::new(answer);
         let stats = outcome.stats_mut();
-        stats.method = finder.method();
-        stats.n_threads = workers.n();
-        stats.backend.push_str(finder.backend());
+        stats.begin(finder.method(), finder.backend(), workers.n());
         let job = Job {
             scene,
             plan,

@@ -95,6 +95,13 @@ impl Clone for Stats {
 }
 
 impl Stats {
+    /// Starts those of a frame. Keeps the allocated memory.
+    pub(crate) fn begin(&mut self, method: &'static str, backend: &str, n_threads: usize) {
+        self.clear();
+        (self.method, self.n_threads) = (method, n_threads);
+        self.backend.push_str(backend);
+    }
+
     /// Clears everything, but keeps the allocated memory.
     pub(crate) fn clear(&mut self) {
         self.clone_from(&Stats::default());
