@@ -7,9 +7,10 @@ export { KINDS };
 
 export const SHAPES = ["solid", "apart", "point", "segment", "polygon"];
 
+// In the order of the module.
 const COUNTS = [
-  ...["nThreads", "nCandidates", "nUnsure", "nWorkItems", "nClusters", "nCulled", "nClustered", "nReclustered", "nBatches"],
-  ...["nPieces", "nReruns", "bytesHeld"],
+  ...["nThreads", "nSubdivided", "nEntries", "nClusters", "nCulled", "nWorkItems", "nCandidates", "nUnsure", "nClustered", "nReclustered"],
+  ...["nBatches", "nPieces", "nReruns", "bytesHeld"],
 ];
 
 export function statsOf([[backend, method, ...names], [totalMs, ...numbers]]) {

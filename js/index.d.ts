@@ -329,13 +329,15 @@ export interface Stats {
   /** Milliseconds for the whole answer. */
   totalMs: number;
   nThreads: number;
+  nSubdivided: number;
+  nEntries: number;
+  nClusters: number;
+  nCulled: number;
+  nWorkItems: number;
   /** Pairs whose boxes overlap. */
   nCandidates: number;
   /** Candidates that exact arithmetic decided. */
   nUnsure: number;
-  nWorkItems: number;
-  nClusters: number;
-  nCulled: number;
   nClustered: number;
   nReclustered: number;
   nBatches: number;

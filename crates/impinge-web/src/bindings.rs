@@ -414,21 +414,8 @@ fn measured(stats: &Stats) -> Array {
     let texts = [&stats.backend[..], stats.method].into_iter();
     let texts = texts.chain(stats.stages.iter().map(|stage| stage.name));
     // Counts stay far below 2^53.
-    let counts = [
-        stats.n_threads as u64,
-        stats.n_candidates,
-        stats.n_unsure,
-        stats.n_work_items,
-        stats.n_clusters,
-        stats.n_culled,
-        stats.n_clustered,
-        stats.n_reclustered,
-        stats.n_batches,
-        stats.n_pieces,
-        stats.n_reruns,
-        stats.bytes_held,
-    ];
-    let numbers = std::iter::once(stats.total_ms).chain(counts.map(|n| n as f64));
+    let counts = stats.counts().map(|(_, n)| n as f64);
+    let numbers = std::iter::once(stats.total_ms).chain(counts);
     let numbers: Vec<f64> = numbers
         .chain(stats.stages.iter().map(|stage| stage.ms))
         .collect();

@@ -152,23 +152,10 @@ fn rounded(ms: f64) -> f64 {
 impl Counters {
     /// Every counter of the statistics under its own name.
     pub fn new(stats: &Stats) -> Self {
-        Counters(json!({
-            "n_threads": stats.n_threads,
-            "grid": stats.grid,
-            "n_subdivided": stats.n_subdivided,
-            "n_entries": stats.n_entries,
-            "n_clusters": stats.n_clusters,
-            "n_culled": stats.n_culled,
-            "n_work_items": stats.n_work_items,
-            "n_candidates": stats.n_candidates,
-            "n_unsure": stats.n_unsure,
-            "n_clustered": stats.n_clustered,
-            "n_reclustered": stats.n_reclustered,
-            "n_batches": stats.n_batches,
-            "n_pieces": stats.n_pieces,
-            "n_reruns": stats.n_reruns,
-            "bytes_held": stats.bytes_held,
-        }))
+        let counts = stats.counts().map(|(name, n)| (name.to_owned(), n.into()));
+        let mut all: Map<_, _> = counts.collect();
+        all.shift_insert(1, "grid".to_owned(), json!(stats.grid));
+        Counters(all.into())
     }
 }
 

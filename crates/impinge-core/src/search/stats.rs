@@ -95,6 +95,18 @@ impl Clone for Stats {
 }
 
 impl Stats {
+    /// All counts, each with the name of its field, in the order of the fields.
+    pub fn counts(&self) -> impl Iterator<Item = (&'static str, u64)> {
+        macro_rules! named {
+            ($($count:ident)*) => { [$((stringify!($count), self.$count as u64)),*] };
+        }
+        let counts = named! {
+            n_threads n_subdivided n_entries n_clusters n_culled n_work_items n_candidates n_unsure
+            n_clustered n_reclustered n_batches n_pieces n_reruns bytes_held
+        };
+        counts.into_iter()
+    }
+
     /// Starts those of a frame. Keeps the allocated memory.
     pub(crate) fn begin(&mut self, method: &'static str, backend: &str, n_threads: usize) {
         self.clear();
