@@ -24,13 +24,6 @@ const COLLIDING: [[u8; 3]; 8] = [
 /// Two greys that are just distinguishable.
 const OTHER: [[u8; 3]; 2] = [[200, 200, 200], [172, 178, 188]];
 
-/// The colour for a number from 0 to 1, a time of contact for one: from red to yellow.
-pub fn ramp(number: f64) -> [u8; 3] {
-    const RED: [f64; 3] = [214.0, 39.0, 40.0];
-    const YELLOW: [f64; 3] = [255.0, 221.0, 87.0];
-    std::array::from_fn(|k| (RED[k] + number.clamp(0.0, 1.0) * (YELLOW[k] - RED[k])).round() as u8)
-}
-
 /// The colours of a body by its number; they repeat after the last one.
 pub fn body(ix: usize) -> BodyColors {
     BodyColors {

@@ -56,6 +56,7 @@ mod orbit;
 mod picture;
 #[cfg(feature = "gpu")]
 mod pipelines;
+mod ramp;
 #[cfg(feature = "gpu")]
 mod renderer;
 mod software;
@@ -78,5 +79,6 @@ pub use picture::{Face, Normals, Picture, Surface};
 #[doc(hidden)]
 #[cfg(feature = "gpu")]
 pub use pipelines::shaders;
+pub use ramp::{Least, ramp};
 #[cfg(feature = "gpu")]
 pub use renderer::Renderer;

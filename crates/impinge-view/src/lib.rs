@@ -36,7 +36,6 @@ mod screen;
 mod session;
 mod stage;
 mod timeline;
-mod times;
 mod view;
 mod window;
 

@@ -2,13 +2,13 @@
 
 use eframe::egui::{self, Color32, Pos2, Rect, RichText, Sense, Stroke, Ui};
 use impinge::{Method, SharedVertex};
+use impinge_render::ramp;
 
 use crate::input::KEYS;
 use crate::options::{Backend, Shows};
 use crate::picture::CURVE;
 use crate::session::{self, Session};
 use crate::timeline::Count;
-use crate::times::color;
 
 /// The colour of messages, and of the first collision.
 pub(crate) const RED: Color32 = Color32::from_rgb(190, 30, 45);
@@ -178,8 +178,8 @@ pub(crate) fn legend(ui: &mut Ui, session: &Session) {
         line(ui, session::NEAR, "within the distance");
     }
     if session.shows_impacts {
-        line(ui, color(0.0), "touches soon after this frame");
-        line(ui, color(1.0), "touches just before the next");
+        line(ui, ramp(0.0), "touches soon after this frame");
+        line(ui, ramp(1.0), "touches just before the next");
     }
     if session.selected.is_some() {
         line(ui, session::SELECTED, "selected");

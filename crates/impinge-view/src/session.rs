@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use eframe::egui;
 use egui_wgpu::RenderState;
 use impinge::{Detector, Element, Method};
-use impinge_render::{Focus, Look, Orbit};
+use impinge_render::{Focus, Least, Look, Orbit, ramp};
 
 use crate::content::Content;
 use crate::drag::Drag;
@@ -20,7 +20,6 @@ use crate::player::Player;
 use crate::screen::Screen;
 use crate::stage::{IDENTITY, Matrix, Stage};
 use crate::timeline::{NEWS, Timeline};
-use crate::times::{color, first_times};
 
 /// The colour of elements within the distance, of the one that is selected, and of its partners.
 pub(crate) const NEAR: [u8; 3] = [255, 165, 60];
@@ -642,15 +641,20 @@ impl Session {
         let impacts = detector
             .impacts(self.stage.scene(), &self.question.query())
             .map_err(|error| error.to_string())?;
-        for (ix, shown) in self.stage.content.bodies.iter().enumerate() {
-            let body = self
-                .stage
-                .scene()
-                .body(shown.id)
-                .map_err(|error| error.to_string())?;
-            let times = first_times(body, shown.id, &impacts);
-            marks[ix] = times.iter().map(|&(element, _)| element).collect();
-            colors[ix].extend(times.iter().map(|&(element, toi)| (element, color(toi))));
+        let (scene, bodies) = (self.stage.scene(), &self.stage.content.bodies);
+        let pairs = impacts.iter().map(|of| (of.kind, [of.a, of.b], of.toi));
+        let times = Least::new(scene, bodies.iter().map(|shown| shown.id), pairs)
+            .map_err(|error| error.to_string())?;
+        for (ix, shown) in bodies.iter().enumerate() {
+            let body = scene.body(shown.id).map_err(|error| error.to_string())?;
+            let time = |element: u32| times.of(ix, body.elements().corners(element as usize));
+            marks[ix].clear();
+            for element in (0..).take(body.n_elements()) {
+                if let Some(toi) = time(element) {
+                    marks[ix].push(element);
+                    colors[ix].push((element, ramp(toi)));
+                }
+            }
         }
         Ok(match impacts.earliest() {
             None => "nothing touches before the next frame".to_owned(),

@@ -2,12 +2,13 @@
 
 use std::io::Write;
 
-use impinge::{BodyId, CancelToken, NearPair, NearPairs, PairKind};
+use impinge::{BodyId, CancelToken, Element, NearPair, NearPairs, PairKind};
+use impinge_render::Least;
 
 use crate::apart::Inputs;
 use crate::args::NearArgs;
 use crate::asked::{Asked, Question, kept, thicken};
-use crate::colors::{self, Ramp};
+use crate::colors;
 use crate::detection::{Times, asked, detector, hit, of_kinds, query};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
@@ -61,8 +62,8 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     let named: Vec<(BodyId, &str)> = bodies.ids.iter().copied().zip(named).collect();
     let shown = near.iter().take_while(|_| is_shown);
     let shown = shown.map(|pair| numbered(&pair, args.distance));
-    let ramp = Ramp::new(&bodies.scene, &named, shown)?;
-    let color = |body: usize, corners: &[u32]| ramp.color(body, corners);
+    let shares = Least::new(&bodies.scene, bodies.ids.iter().copied(), shown)?;
+    let color = colors::by_number(&shares);
     if let Some(file) = &args.shown.out {
         colors::write(file, &bodies.scene, &named, color)?;
     }
@@ -87,7 +88,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
 }
 
 /// A pair, and its share of the distance that was asked for. With thickness it may be farther.
-fn numbered(pair: &NearPair, most: f64) -> colors::Found {
+fn numbered(pair: &NearPair, most: f64) -> (PairKind, [Element; 2], f64) {
     let distance = pair.distance.unwrap_or(0.0);
     let share = if distance > 0.0 {
         (distance / most).min(1.0)

@@ -4,6 +4,7 @@ use std::io::Write;
 
 use impinge::{BodyId, Bounds, CancelToken, SafeDistances};
 use impinge_io::{Cell, Column, Holds, printable};
+use impinge_render::ramp;
 
 use crate::apart::Inputs;
 use crate::args::SafeArgs;
@@ -244,7 +245,7 @@ impl Answer<'_> {
             .map(|&corner| bounds.get(corner as usize))
             .fold(f64::INFINITY, f64::min);
         match least < self.most(body) && !self.args.fixed.contains(&body) {
-            true => (palette::ramp(least / self.args.most), true),
+            true => (ramp(least / self.args.most), true),
             false => (palette::body(body).other, false),
         }
     }

@@ -10,11 +10,12 @@ use std::io::Write;
 
 use impinge::{BodyId, CancelToken, Precision, SharedVertex};
 use impinge_io::impact_columns;
+use impinge_render::Least;
 
 use crate::apart::Inputs;
 use crate::args::StepArgs;
 use crate::asked::{Asked, Question, thicken};
-use crate::colors::{self, Ramp};
+use crate::colors;
 use crate::detection::{Times, detector, query};
 use crate::error::Error;
 use crate::load::Nouns;
@@ -128,8 +129,8 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     let named: Vec<(BodyId, &str)> = bodies.ids.iter().copied().zip(named).collect();
     let shown = impacts.iter().take_while(|_| args.shown.any());
     let shown = shown.map(|impact| (impact.kind, [impact.a, impact.b], impact.toi));
-    let ramp = Ramp::new(&bodies.scene, &named, shown)?;
-    let color = |body: usize, corners: &[u32]| ramp.color(body, corners);
+    let firsts = Least::new(&bodies.scene, bodies.ids.iter().copied(), shown)?;
+    let color = colors::by_number(&firsts);
     if let Some(file) = &args.shown.out {
         colors::write(file, &bodies.scene, &named, color)?;
     }
