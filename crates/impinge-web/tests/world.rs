@@ -617,10 +617,7 @@ fn scenes_are_written_for_browsers_with_the_native_answer() -> Result<(), Box<dy
             .ok_or("nothing starts to touch")?;
         let (kind, toi) = (first.kind.name(), first.toi);
         let (n_impacts, impacts_hash) = (impacts.len(), impacts.hash());
-        let rule = match rule {
-            SharedVertex::Skip => "skip",
-            SharedVertex::Resolve => "resolve",
-        };
+        let rule = rule.name();
         let bodies = bodies.join(",");
         written.push(format!(
             "{{\"name\":\"{name}\",\"sharedVertex\":\"{rule}\",\"pairs\":{n_pairs},\"hash\":\"{hash:016x}\",\

@@ -40,6 +40,7 @@ pub struct Weld {
 /// As many positions are needed as were welded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{given} positions given for a weld of {expected} vertices")]
+#[non_exhaustive]
 pub struct WrongNumber {
     /// How many positions were given.
     pub given: usize,

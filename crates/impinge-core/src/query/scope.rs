@@ -15,6 +15,7 @@ use impinge_exact::internal::Keep;
 
 /// How pairs of one body that share vertices are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum SharedVertex {
     /// Pairs that share a vertex index are not reported.
     Skip,

@@ -20,6 +20,7 @@ pub enum Feature {
 /// several nearest points (of parallel edges or flat elements), the first of the smallest features
 /// counts, in the order of ipc-toolkit's names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct NearestFeatures {
     /// The feature of the first element.
     pub a: Feature,

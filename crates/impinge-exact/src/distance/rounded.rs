@@ -12,6 +12,7 @@ use crate::{Point, Sign};
 
 /// Nearest points of two elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct NearestPoints {
     /// The features that contain them; exact.
     pub nearest: NearestFeatures,
