@@ -101,7 +101,20 @@ class Impinge(Contender):
         return self.result.between(self.a, self.b)
 
 
-class Libigl(Contender):
+class Peer(Contender):
+    """One that takes vertices as float64 and faces as int64."""
+
+    def start(self, faces_a, faces_b, vertices_a, vertices_b):
+        self.faces = (
+            np.ascontiguousarray(faces_a, np.int64),
+            np.ascontiguousarray(faces_b, np.int64),
+        )
+
+    def arrays(self, vertices_a, vertices_b):
+        return vertices_a.astype(np.float64), vertices_b.astype(np.float64)
+
+
+class Libigl(Peer):
     """CGAL's exact kernel through libigl: boxes are sorted again at every call."""
 
     label, package, exact = "libigl (CGAL, exact kernel)", "libigl", True
@@ -112,15 +125,6 @@ class Libigl(Contender):
         from igl.copyleft import cgal
 
         self.intersect = cgal.intersect_other
-
-    def start(self, faces_a, faces_b, vertices_a, vertices_b):
-        self.faces = (
-            np.ascontiguousarray(faces_a, np.int64),
-            np.ascontiguousarray(faces_b, np.int64),
-        )
-
-    def arrays(self, vertices_a, vertices_b):
-        return vertices_a.astype(np.float64), vertices_b.astype(np.float64)
 
     def build(self, arrays):
         self.vertices = arrays
@@ -133,7 +137,7 @@ class Libigl(Contender):
         return self.answer
 
 
-class Coal(Contender):
+class Coal(Peer):
     """Trees of boxes; the tree is rebuilt in each frame."""
 
     label, package = "Coal", "coal"
@@ -144,7 +148,7 @@ class Coal(Contender):
         "floating point, float64",
         "rebuild, or refit",
     )
-    words, settings = ", rebuilt", "BVHModelOBB, all contacts"
+    tree, words, settings = "BVHModelOBB", ", rebuilt", "BVHModelOBB, all contacts"
 
     def __init__(self):
         import coal
@@ -158,17 +162,8 @@ class Coal(Contender):
     def name(self):
         return self.label + self.words
 
-    def start(self, faces_a, faces_b, vertices_a, vertices_b):
-        self.faces = (
-            np.ascontiguousarray(faces_a, np.int64),
-            np.ascontiguousarray(faces_b, np.int64),
-        )
-
-    def arrays(self, vertices_a, vertices_b):
-        return vertices_a.astype(np.float64), vertices_b.astype(np.float64)
-
     def model(self, vertices, faces):
-        model = self.coal.BVHModelOBB()
+        model = getattr(self.coal, self.tree)()
         model.beginModel(len(faces), len(vertices))
         model.addVertices(vertices)
         model.addTriangles(faces)
@@ -211,7 +206,7 @@ class CoalRefit(Coal):
             model.endReplaceModel(True, True)
 
 
-class Fcl(Contender):
+class Fcl(Peer):
     """Trees of boxes; its Python module has no refit."""
 
     label, package = "FCL, rebuilt", "python-fcl"
@@ -229,15 +224,6 @@ class Fcl(Contender):
 
         self.fcl = fcl
         self.request = fcl.CollisionRequest(num_max_contacts=ALL, enable_contact=True)
-
-    def start(self, faces_a, faces_b, vertices_a, vertices_b):
-        self.faces = (
-            np.ascontiguousarray(faces_a, np.int64),
-            np.ascontiguousarray(faces_b, np.int64),
-        )
-
-    def arrays(self, vertices_a, vertices_b):
-        return vertices_a.astype(np.float64), vertices_b.astype(np.float64)
 
     def build(self, arrays):
         self.objects = []

@@ -31,6 +31,7 @@ from fractions import Fraction
 
 import numpy as np
 
+import contenders
 import impinge
 from compare import milliseconds
 from meshes import read_frame, read_ply
@@ -44,19 +45,19 @@ def clock(work):
     return result, 1e3 * (time.perf_counter() - wall), 1e3 * (time.process_time() - processor)
 
 
-class Ours:
-    label = "impinge"
-
-    def __init__(self, bodies, **settings):
+class Ours(contenders.Contender):
+    def __init__(self, **settings):
         self.label = "impinge" + "".join(f", {k}={v}" for k, v in settings.items())
-        self.scene = impinge.Scene()
-        self.ids = [self.scene.add(vertices, faces) for vertices, faces in bodies]
         self.detector = impinge.Detector("cpu", **settings)
 
-    def arrays(self, positions):
+    def start(self, faces_a, faces_b, vertices_a, vertices_b):
+        self.scene = impinge.Scene()
+        self.ids = self.scene.add(vertices_a, faces_a), self.scene.add(vertices_b, faces_b)
+
+    def arrays(self, *positions):
         return positions
 
-    def move(self, positions):
+    def build(self, positions):
         for body, vertices in zip(self.ids, positions):
             self.scene.set_positions(body, vertices)
 
@@ -64,104 +65,40 @@ class Ours:
         return self.detector.distance(self.scene, *self.ids).distance
 
 
-class Coal:
+class Coal(contenders.Coal):
     """Trees of oriented boxes and rectangle swept spheres, which Coal has for distances."""
 
-    label = "Coal, OBBRSS, rebuilt"
-
-    def __init__(self, bodies):
-        import coal
-
-        self.coal = coal
-        self.faces = [np.ascontiguousarray(faces, np.int64) for _, faces in bodies]
-        self.here = coal.Transform3s()
-
-    def arrays(self, positions):
-        return [vertices.astype(np.float64) for vertices in positions]
-
-    def move(self, positions):
-        self.models = [self.model(*mesh) for mesh in zip(positions, self.faces)]
-
-    def model(self, vertices, faces):
-        model = self.coal.BVHModelOBBRSS()
-        model.beginModel(len(faces), len(vertices))
-        model.addVertices(vertices)
-        model.addTriangles(faces)
-        model.endModel()
-        return model
+    label, tree = "Coal, OBBRSS, rebuilt", "BVHModelOBBRSS"
 
     def ask(self):
-        result = self.coal.DistanceResult()
+        result, here = self.coal.DistanceResult(), self.identity
         a, b = self.models
-        self.coal.distance(a, self.here, b, self.here, self.coal.DistanceRequest(), result)
+        self.coal.distance(a, here, b, here, self.coal.DistanceRequest(), result)
         return max(result.min_distance, 0.0)
 
 
-class CoalRefit(Coal):
-    """The same trees, refitted; copying NumPy rows into Coal's own vectors is not counted."""
-
+class CoalRefit(Coal, contenders.CoalRefit):
     label = "Coal, OBBRSS, refitted"
 
-    def __init__(self, bodies):
-        super().__init__(bodies)
-        super().move(super().arrays([vertices for vertices, _ in bodies]))
 
-    def arrays(self, positions):
-        vectors = []
-        for vertices in super().arrays(positions):
-            vectors.append(self.coal.StdVec_Vec3s())
-            vectors[-1].extend(list(vertices))
-        return vectors
-
-    def move(self, positions):
-        for model, vertices in zip(self.models, positions):
-            model.beginReplaceModel()
-            model.replaceSubModel(vertices)
-            model.endReplaceModel(True, True)
-
-
-class Fcl:
-    label = "FCL, rebuilt"
-
-    def __init__(self, bodies):
-        import fcl
-
-        self.fcl = fcl
-        self.faces = [np.ascontiguousarray(faces, np.int64) for _, faces in bodies]
-
-    def arrays(self, positions):
-        return [vertices.astype(np.float64) for vertices in positions]
-
-    def move(self, positions):
-        self.objects = []
-        for vertices, faces in zip(positions, self.faces):
-            model = self.fcl.BVHModel()
-            model.beginModel(len(vertices), len(faces))
-            model.addSubModel(vertices, faces)
-            model.endModel()
-            self.objects.append(self.fcl.CollisionObject(model))
-
+class Fcl(contenders.Fcl):
     def ask(self):
         result = self.fcl.DistanceResult()
         return max(self.fcl.distance(*self.objects, self.fcl.DistanceRequest(), result), 0.0)
 
 
-class Trimesh:
+class Trimesh(contenders.Peer):
     """The nearest point of one body's surface to each vertex of the other, both ways: an upper bound of the distance."""
 
     label = "trimesh.proximity, vertices alone"
 
-    def __init__(self, bodies):
+    def __init__(self):
         import rtree  # noqa: F401, without it trimesh has no such query
         import trimesh
 
         self.trimesh = trimesh
-        self.faces = [faces for _, faces in bodies]
 
-    def arrays(self, positions):
-        return [vertices.astype(np.float64) for vertices in positions]
-
-    def move(self, positions):
+    def build(self, positions):
         self.meshes = [
             self.trimesh.Trimesh(vertices, faces, process=False, validate=False)
             for vertices, faces in zip(positions, self.faces)
@@ -196,8 +133,8 @@ def contest(contestants, bodies, rounds):
         positions = mirrored(bodies, round_ % 2)
         for contestant in contestants:
             row = rows.setdefault(contestant.label, {key: [] for key in KEYS})
-            arrays = contestant.arrays(positions)
-            _, move, move_cpu = clock(lambda: contestant.move(arrays))
+            arrays = contestant.arrays(*positions)
+            _, move, move_cpu = clock(lambda: contestant.build(arrays))
             found, ask, ask_cpu = clock(contestant.ask)
             _, still, still_cpu = clock(contestant.ask)
             row["distance"] = found
@@ -222,9 +159,12 @@ def made(kinds, bodies, missing):
     present = []
     for kind in kinds:
         try:
-            present.append(kind(bodies))
+            present.append(kind())
         except ImportError as error:
             missing.add(str(error))
+            continue
+        (vertices_a, faces_a), (vertices_b, faces_b) = bodies
+        present[-1].start(faces_a, faces_b, vertices_a, vertices_b)
     return present
 
 
@@ -241,7 +181,7 @@ def distances(data, rounds, missing):
     for name, pair in [("dragon and dragon", (dragon, dragon)), ("bunny and buddha", (bunny, buddha))]:
         for gap in [0.3, 0.03, 0.0]:
             bodies = beside(*pair, gap)
-            kinds = [Ours, lambda bodies: Ours(bodies, threads=1), Coal, CoalRefit, Fcl]
+            kinds = [Ours, lambda: Ours(threads=1), Coal, CoalRefit, Fcl]
             distance, rows = contest(made(kinds, bodies, missing), bodies, rounds)
             record.append({"scene": name, "gap": gap, "distance": distance, "rows": rows})
             print(f"{name}, {gap}: {distance:.6g}", file=sys.stderr)
