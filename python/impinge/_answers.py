@@ -206,7 +206,38 @@ def _no_index(given: str) -> TypeError:
     return TypeError(f"index: a whole number, a slice or an array of whole numbers or booleans expected, {given} given")
 
 
-class Pairs:
+class _Answer:
+    """What answers have in common."""
+
+    __slots__ = ("_inner",)
+
+    def __init__(self, inner: Any) -> None:
+        self._inner = inner
+
+    @property
+    def stats(self) -> Stats:
+        """Stats : what the answer cost."""
+        return Stats(**self._inner.stats())
+
+    def __reduce__(self) -> NoReturn:
+        name = type(self).__name__
+        raise TypeError(f"{name} name bodies of a live scene: pickle their arrays")
+
+
+class _Rows(_Answer):
+    """What answers with rows have in common. ``len`` is their number."""
+
+    __slots__ = ("_rows",)
+
+    def __init__(self, inner: Any) -> None:
+        self._inner = inner
+        self._rows: npt.NDArray[np.uint32] | None = None
+
+    def __len__(self) -> int:
+        return len(self._inner)
+
+
+class Pairs(_Rows):
     """The pairs of elements that intersect: sorted.
 
     ``len(pairs)`` is their number; no pairs are false. Pairs are a sequence of rows, each a tuple of four int: number of a body, its
@@ -214,11 +245,11 @@ class Pairs:
     booleans chooses, and ``numpy.asarray(pairs)``, which has shape (n, 4).
     """
 
-    __slots__ = ("_hash", "_inner", "_rows")
+    __slots__ = ("_hash",)
+    _inner: _impinge.Pairs
 
     def __init__(self, inner: _impinge.Pairs) -> None:
-        self._inner = inner
-        self._rows: npt.NDArray[np.uint32] | None = None
+        self._inner, self._rows = inner, None
         self._hash: int | None = None
 
     @property
@@ -368,14 +399,6 @@ class Pairs:
             self._hash = self._inner.hash()
         return self._hash
 
-    @property
-    def stats(self) -> Stats:
-        """Stats : what the answer cost."""
-        return Stats(**self._inner.stats())
-
-    def __len__(self) -> int:
-        return len(self._inner)
-
     # An array of one element is a SupportsIndex to type checkers, too.
     @overload
     def __getitem__(  # type: ignore[overload-overlap]
@@ -422,14 +445,13 @@ class Pairs:
         return f"Pairs({len(self)} pairs of {n_bodies} bodies, hash {self.hash:#018x})"
 
 
-class _OfKinds:
+class _OfKinds(_Rows):
     """What answers about pairs of several kinds have in common."""
 
-    __slots__ = ("_inner", "_kinds", "_rows")
+    __slots__ = ("_kinds",)
 
     def __init__(self, inner: Any) -> None:
-        self._inner = inner
-        self._rows: npt.NDArray[np.uint32] | None = None
+        self._inner, self._rows = inner, None
         self._kinds: npt.NDArray[np.uint8] | None = None
 
     @property
@@ -458,18 +480,6 @@ class _OfKinds:
         """int : a 64-bit hash of the set, all that was decided of its pairs included; equal sets have equal hashes everywhere."""
         value: int = self._inner.hash()
         return value
-
-    @property
-    def stats(self) -> Stats:
-        """Stats : what the answer cost."""
-        return Stats(**self._inner.stats())
-
-    def __len__(self) -> int:
-        return len(self._inner)
-
-    def __reduce__(self) -> NoReturn:
-        name = type(self).__name__
-        raise TypeError(f"{name} name bodies of a live scene: pickle their arrays")
 
     def __repr__(self) -> str:
         counts = np.bincount(self.kinds, minlength=len(_impinge.KINDS)).tolist()
@@ -814,13 +824,11 @@ class Stencils:
         return f"Stencils({', '.join(named)})"
 
 
-class SafeDistances:
+class SafeDistances(_Answer):
     """How far each vertex may move, on any path, so that nothing touches."""
 
-    __slots__ = ("_inner",)
-
-    def __init__(self, inner: _impinge.SafeDistances) -> None:
-        self._inner = inner
+    __slots__ = ()
+    _inner: _impinge.SafeDistances
 
     def of(self, body: _Body) -> npt.NDArray[np.floating[Any]]:
         """The bounds of the vertices of a body, in the unit of the scene, rounded down.
@@ -848,14 +856,6 @@ class SafeDistances:
         """
         return NearPairs(self._inner.touching())
 
-    @property
-    def stats(self) -> Stats:
-        """Stats : what the answer cost."""
-        return Stats(**self._inner.stats())
-
-    def __reduce__(self) -> NoReturn:
-        raise TypeError("SafeDistances name bodies of a live scene: pickle their arrays")
-
     def __repr__(self) -> str:
         return f"SafeDistances({self._inner.n_vertices()} vertices, {self._inner.n_touching()} touching pairs)"
 
@@ -873,14 +873,15 @@ class Csr(NamedTuple):
     distances: npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
 
-class Neighbours:
+class Neighbours(_Answer):
     """Which elements are near each element: the pairs of `Detector.near` as lists.
 
     ``len(neighbours)`` is the number of pairs. The vertices of all bodies are numbered one after another in the order of the bodies,
     and so are the edges and the faces: `first`.
     """
 
-    __slots__ = ("_inner", "_lists", "_rooms")
+    __slots__ = ("_lists", "_rooms")
+    _inner: _impinge.Neighbours
 
     def __init__(self, inner: _impinge.Neighbours) -> None:
         self._inner = inner
@@ -969,11 +970,6 @@ class Neighbours:
         """
         return self._inner.first(body, part)
 
-    @property
-    def stats(self) -> Stats:
-        """Stats : what the answer cost."""
-        return Stats(**self._inner.stats())
-
     def __len__(self) -> int:
         return len(self._inner)
 
@@ -1008,17 +1004,14 @@ class Candidates(_OfKinds):
         return Candidates(self._inner.of(kind))
 
 
-class Closest:
+class Closest(_Rows):
     """The element that is nearest to each point. ``len(closest)`` is the number of points; the attributes are arrays with one row per
     point. Asked with ``n_nearest=k`` and k above 1, they have shape (n, k) and (n, k, 2) or (n, k, 3): of each point k elements, nearest
     first, those at the same distance by body and number.
     """
 
-    __slots__ = ("_inner", "_rows")
-
-    def __init__(self, inner: _impinge.Closest) -> None:
-        self._inner = inner
-        self._rows: npt.NDArray[np.uint32] | None = None
+    __slots__ = ()
+    _inner: _impinge.Closest
 
     @property
     def rows(self) -> npt.NDArray[np.uint32]:
@@ -1057,14 +1050,6 @@ class Closest:
         """int : a 64-bit hash of the rows in their order; equal answers have equal hashes everywhere."""
         return self._inner.hash()
 
-    @property
-    def stats(self) -> Stats:
-        """Stats : what the answer cost."""
-        return Stats(**self._inner.stats())
-
-    def __len__(self) -> int:
-        return len(self._inner)
-
     def __reduce__(self) -> NoReturn:
         raise TypeError("a Closest names bodies of a live scene: pickle its arrays")
 
@@ -1072,7 +1057,7 @@ class Closest:
         return f"Closest({len(self)} points)"
 
 
-class Hits:
+class Hits(_Rows):
     """What rays hit. ``len(hits)`` is the number of rays.
 
     Asked with ``hits="first"``, the columns have one row per ray. With ``"all"`` they have one per hit, the rays one after the other:
@@ -1080,11 +1065,8 @@ class Hits:
     `hit`.
     """
 
-    __slots__ = ("_inner", "_rows")
-
-    def __init__(self, inner: _impinge.Hits) -> None:
-        self._inner = inner
-        self._rows: npt.NDArray[np.uint32] | None = None
+    __slots__ = ()
+    _inner: _impinge.Hits
 
     @property
     def hit(self) -> npt.NDArray[np.bool_]:
@@ -1143,17 +1125,6 @@ class Hits:
         """int : a 64-bit hash of the rays, what they hit and in which order; equal answers have equal hashes everywhere."""
         return self._inner.hash()
 
-    @property
-    def stats(self) -> Stats:
-        """Stats : what the answer cost."""
-        return Stats(**self._inner.stats())
-
-    def __len__(self) -> int:
-        return len(self._inner)
-
-    def __reduce__(self) -> NoReturn:
-        raise TypeError("Hits name bodies of a live scene: pickle their arrays")
-
     def __repr__(self) -> str:
         return f"Hits({len(self)} rays)"
 
@@ -1164,6 +1135,9 @@ class _Motion:
     __slots__ = ("_inner",)
 
     _inner: _impinge.Advance | _impinge.Truncation
+
+    def __init__(self, inner: Any) -> None:
+        self._inner = inner
 
     @property
     def start_intersects(self) -> bool | None:
@@ -1227,9 +1201,6 @@ class Advance(_Motion):
     __slots__ = ()
     _inner: _impinge.Advance
 
-    def __init__(self, inner: _impinge.Advance) -> None:
-        self._inner = inner
-
     @property
     def fraction(self) -> float:
         """float : the part of the step that can be taken: 1 for all of it, 0 for none. With a clearance it holds for all smaller
@@ -1261,9 +1232,6 @@ class Truncation(_Motion):
 
     __slots__ = ()
     _inner: _impinge.Truncation
-
-    def __init__(self, inner: _impinge.Truncation) -> None:
-        self._inner = inner
 
     @property
     def n_cut(self) -> int:
