@@ -19,35 +19,39 @@ pub fn of_path<T: OfPath + Clone + Send + Sync + 'static>() -> ValueParser {
     ValueParser::new(OsStringValueParser::new().try_map(|path| T::of_path(path.as_ref())))
 }
 
-/// Options of these types take paths.
-macro_rules! of_paths {
-    ($($file:ty),*) => {
-        $(impl ValueParserFactory for $file {
-            type Parser = ValueParser;
-
-            fn value_parser() -> ValueParser {
-                of_path::<Self>()
-            }
-        })*
-    };
+/// A file of a format that its name tells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileOf<F> {
+    pub path: PathBuf,
+    pub format: F,
 }
 
-of_paths!(
-    RowsFile,
-    CurvesFile,
-    MeshFile,
-    ReachedFile,
-    MendedFile,
-    PngFile,
-    HtmlFile
-);
+/// The formats of a kind of file.
+pub trait OfName: Sized {
+    /// The format of a file, by its path and its extension in lower case.
+    fn of_name(path: &Path, extension: &str) -> Result<Self, &'static str>;
+}
+
+impl<F: OfName> OfPath for FileOf<F> {
+    fn of_path(path: &Path) -> Result<Self, String> {
+        let extension = path.extension().unwrap_or_default();
+        let extension = extension.to_string_lossy().to_ascii_lowercase();
+        let format = F::of_name(path, &extension)?;
+        let path = path.to_owned();
+        Ok(FileOf { path, format })
+    }
+}
+
+impl<F: OfName + Clone + Send + Sync + 'static> ValueParserFactory for FileOf<F> {
+    type Parser = ValueParser;
+
+    fn value_parser() -> ValueParser {
+        of_path::<Self>()
+    }
+}
 
 /// A file for rows.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RowsFile {
-    pub path: PathBuf,
-    pub format: RowsFormat,
-}
+pub type RowsFile = FileOf<RowsFormat>;
 
 /// The format of rows of pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -63,24 +67,27 @@ pub enum RowsFormat {
     Parquet,
 }
 
+impl OfName for RowsFormat {
+    fn of_name(path: &Path, extension: &str) -> Result<Self, &'static str> {
+        match extension {
+            "npy" => Ok(RowsFormat::Npy),
+            "csv" => Ok(RowsFormat::Csv),
+            "jsonl" | "ndjson" => Ok(RowsFormat::Jsonl),
+            #[cfg(feature = "parquet")]
+            "parquet" => Ok(RowsFormat::Parquet),
+            #[cfg(not(feature = "parquet"))]
+            "parquet" => Err("this program was built without the feature parquet"),
+            _ if path == Path::new("-") => Ok(RowsFormat::Csv),
+            _ => Err("rows are written as .csv, .jsonl, .npy or .parquet"),
+        }
+    }
+}
+
 impl RowsFile {
     /// A file whose name gives the format, unless that is told.
     pub fn new(path: &Path, format: Option<RowsFormat>) -> Result<Self, String> {
-        let format = match format {
-            Some(format) => format,
-            None => match extension(path).as_str() {
-                "npy" => RowsFormat::Npy,
-                "csv" => RowsFormat::Csv,
-                "jsonl" | "ndjson" => RowsFormat::Jsonl,
-                #[cfg(feature = "parquet")]
-                "parquet" => RowsFormat::Parquet,
-                #[cfg(not(feature = "parquet"))]
-                "parquet" => {
-                    return Err("this program was built without the feature parquet".to_owned());
-                }
-                _ if path == Path::new("-") => RowsFormat::Csv,
-                _ => return Err("rows are written as .csv, .jsonl, .npy or .parquet".to_owned()),
-            },
+        let Some(format) = format else {
+            return Self::of_path(path);
         };
         let path = path.to_owned();
         Ok(RowsFile { path, format })
@@ -92,18 +99,8 @@ impl RowsFile {
     }
 }
 
-impl OfPath for RowsFile {
-    fn of_path(path: &Path) -> Result<Self, String> {
-        RowsFile::new(path, None)
-    }
-}
-
 /// A file for curves.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CurvesFile {
-    pub path: PathBuf,
-    pub format: CurvesFormat,
-}
+pub type CurvesFile = FileOf<CurvesFormat>;
 
 /// The format of curves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,27 +110,19 @@ pub enum CurvesFormat {
     Vtu,
 }
 
-impl OfPath for CurvesFile {
-    fn of_path(path: &Path) -> Result<Self, String> {
-        let format = match extension(path).as_str() {
-            "ply" => CurvesFormat::Ply,
-            "obj" => CurvesFormat::Obj,
-            "vtu" => CurvesFormat::Vtu,
-            _ => return Err("curves are written as .ply, .obj or .vtu".to_owned()),
-        };
-        Ok(CurvesFile {
-            path: path.to_owned(),
-            format,
-        })
+impl OfName for CurvesFormat {
+    fn of_name(_: &Path, extension: &str) -> Result<Self, &'static str> {
+        match extension {
+            "ply" => Ok(CurvesFormat::Ply),
+            "obj" => Ok(CurvesFormat::Obj),
+            "vtu" => Ok(CurvesFormat::Vtu),
+            _ => Err("curves are written as .ply, .obj or .vtu"),
+        }
     }
 }
 
 /// A file for coloured meshes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct MeshFile {
-    pub path: PathBuf,
-    pub format: MeshFormat,
-}
+pub type MeshFile = FileOf<MeshFormat>;
 
 /// The format of coloured meshes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -143,48 +132,41 @@ pub enum MeshFormat {
     Vtu,
 }
 
-impl OfPath for MeshFile {
-    fn of_path(path: &Path) -> Result<Self, String> {
-        let format = match extension(path).as_str() {
-            "ply" => MeshFormat::Ply,
-            "glb" => MeshFormat::Glb,
-            "vtu" => MeshFormat::Vtu,
-            _ => return Err("meshes are written as .ply, .glb or .vtu".to_owned()),
-        };
-        Ok(MeshFile {
-            path: path.to_owned(),
-            format,
-        })
+impl OfName for MeshFormat {
+    fn of_name(_: &Path, extension: &str) -> Result<Self, &'static str> {
+        match extension {
+            "ply" => Ok(MeshFormat::Ply),
+            "glb" => Ok(MeshFormat::Glb),
+            "vtu" => Ok(MeshFormat::Vtu),
+            _ => Err("meshes are written as .ply, .glb or .vtu"),
+        }
     }
 }
 
 /// A file for a body at the end of a step, exactly.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ReachedFile {
-    pub path: PathBuf,
-    pub is_obj: bool,
+pub type ReachedFile = FileOf<ReachedFormat>;
+
+/// The format of such a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReachedFormat {
+    Ply,
+    Obj,
 }
 
-impl OfPath for ReachedFile {
-    fn of_path(path: &Path) -> Result<Self, String> {
-        let is_obj = match extension(path).as_str() {
-            "obj" => true,
-            "ply" => false,
-            _ => return Err("bodies are written as .ply or .obj".to_owned()),
-        };
-        let path = path.to_owned();
-        Ok(ReachedFile { path, is_obj })
+impl OfName for ReachedFormat {
+    fn of_name(_: &Path, extension: &str) -> Result<Self, &'static str> {
+        match extension {
+            "ply" => Ok(ReachedFormat::Ply),
+            "obj" => Ok(ReachedFormat::Obj),
+            _ => Err("bodies are written as .ply or .obj"),
+        }
     }
 }
 
 /// A file for a mended mesh.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct MendedFile {
-    pub path: PathBuf,
-    pub format: MendedFormat,
-}
+pub type MendedFile = FileOf<MendedFormat>;
 
-/// Formats of mended meshes.
+/// The format of mended meshes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MendedFormat {
     Ply,
@@ -192,16 +174,46 @@ pub enum MendedFormat {
     Stl,
 }
 
-impl OfPath for MendedFile {
-    fn of_path(path: &Path) -> Result<Self, String> {
-        let format = match extension(path).as_str() {
-            "ply" => MendedFormat::Ply,
-            "obj" => MendedFormat::Obj,
-            "stl" => MendedFormat::Stl,
-            _ => return Err("mended meshes are written as .ply, .obj or .stl".to_owned()),
-        };
-        let path = path.to_owned();
-        Ok(MendedFile { path, format })
+impl OfName for MendedFormat {
+    fn of_name(_: &Path, extension: &str) -> Result<Self, &'static str> {
+        match extension {
+            "ply" => Ok(MendedFormat::Ply),
+            "obj" => Ok(MendedFormat::Obj),
+            "stl" => Ok(MendedFormat::Stl),
+            _ => Err("mended meshes are written as .ply, .obj or .stl"),
+        }
+    }
+}
+
+/// A file for a picture.
+pub type PngFile = FileOf<Png>;
+
+/// The format of pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Png;
+
+impl OfName for Png {
+    fn of_name(_: &Path, extension: &str) -> Result<Self, &'static str> {
+        match extension {
+            "png" => Ok(Png),
+            _ => Err("pictures are written as .png"),
+        }
+    }
+}
+
+/// A file for a page.
+pub type HtmlFile = FileOf<Html>;
+
+/// The format of pages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Html;
+
+impl OfName for Html {
+    fn of_name(_: &Path, extension: &str) -> Result<Self, &'static str> {
+        match extension {
+            "html" | "htm" => Ok(Html),
+            _ => Err("reports are written as .html"),
+        }
     }
 }
 
@@ -280,11 +292,6 @@ pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
         .ok_or_else(|| "expected a whole number of at least 1 and at most 1024".to_owned())
 }
 
-fn extension(path: &Path) -> String {
-    let extension = path.extension().unwrap_or_default();
-    extension.to_string_lossy().to_ascii_lowercase()
-}
-
 /// Frames `start..end` of a sequence; `end` may be open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FrameRange {
@@ -316,32 +323,6 @@ impl FromStr for FrameRange {
             return Err(format!("no frame lies in {text}"));
         }
         Ok(FrameRange { start, end })
-    }
-}
-
-/// A file for a picture.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PngFile(pub PathBuf);
-
-impl OfPath for PngFile {
-    fn of_path(path: &Path) -> Result<Self, String> {
-        match extension(path).as_str() {
-            "png" => Ok(PngFile(path.to_owned())),
-            _ => Err("pictures are written as .png".to_owned()),
-        }
-    }
-}
-
-/// A file for a page.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct HtmlFile(pub PathBuf);
-
-impl OfPath for HtmlFile {
-    fn of_path(path: &Path) -> Result<Self, String> {
-        match extension(path).as_str() {
-            "html" | "htm" => Ok(HtmlFile(path.to_owned())),
-            _ => Err("reports are written as .html".to_owned()),
-        }
     }
 }
 
@@ -669,10 +650,7 @@ mod tests {
         assert!(elevation("90.5").is_err() && elevation("nan").is_err());
         assert_eq!((part("0"), part("1")), (Ok(0.0), Ok(1.0)));
         assert!(part("-0.1").is_err() && part("1.1").is_err());
-        assert_eq!(
-            PngFile::of_path("a.PNG".as_ref()),
-            Ok(PngFile("a.PNG".into()))
-        );
+        assert!(PngFile::of_path("a.PNG".as_ref()).is_ok());
         assert!(PngFile::of_path("a.jpg".as_ref()).is_err());
     }
 

@@ -23,7 +23,7 @@ impl ShownArgs {
     /// The files, each with its option.
     pub fn outputs(&self) -> impl Iterator<Item = (&'static str, &Path)> {
         let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
-        let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
+        let png = self.png.as_ref().map(|file| ("--png", file.path.as_path()));
         out.into_iter().chain(png)
     }
 

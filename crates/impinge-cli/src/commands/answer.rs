@@ -225,7 +225,7 @@ fn answer(
     // The picture comes last, so that the answer is printed even without an adapter.
     if let Some(png) = &answer.shown.png {
         let mut drawer = Drawer::new(&answer.shown.picture, how.device.as_deref(), threads)?;
-        drawer.write(&png.0, &scene, &bodies, pairs)?;
+        drawer.write(&png.path, &scene, &bodies, pairs)?;
     }
     end(ask, !pairs.is_empty(), &unread, paths.len())
 }

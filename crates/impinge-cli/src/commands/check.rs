@@ -118,13 +118,13 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         append(path, &report.markdown())?;
     }
     if let Some(file) = &args.html {
-        html::write(&file.0, &report, args)?;
-        say_wrote(&file.0, args)?;
+        html::write(&file.path, &report, args)?;
+        say_wrote(&file.path, args)?;
     }
     // The picture comes last, so that the answer is printed even without an adapter.
     if let Some(png) = &args.png {
-        shown::draw(&png.0, &rows, args)?;
-        say_wrote(&png.0, args)?;
+        shown::draw(&png.path, &rows, args)?;
+        say_wrote(&png.path, args)?;
     }
     ending::fail(&report)
 }

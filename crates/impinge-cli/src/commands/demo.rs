@@ -64,7 +64,7 @@ pub fn demo(args: &DemoArgs, cancel: &CancelToken) -> Result<(), Error> {
     check(args, &demo, fullest, &pairs, cancel)?;
 
     let png = match &args.png {
-        Some(file) => file.0.clone(),
+        Some(file) => file.path.clone(),
         None => args.out.path.with_extension("png"),
     };
     for folder in [&args.out.path, &png]

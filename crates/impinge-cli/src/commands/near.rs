@@ -82,7 +82,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     if let Some(png) = &args.shown.png {
         let surfaces = colors::surfaces(&bodies.scene, &named, color)?;
         let device = args.detector.device.as_deref();
-        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, surfaces)?;
+        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.path, surfaces)?;
     }
     hit(ask.fail_on_hit, !near.is_empty() || intersects)
 }

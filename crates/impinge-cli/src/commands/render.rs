@@ -18,7 +18,7 @@ use crate::{headline, regions, report};
 /// Draws meshes, and prints what collides.
 pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
     let how = &args.detector;
-    let path = &args.png.0;
+    let path = &args.png.path;
     let is_self = args.within || args.meshes.len() == 1;
     Inputs::new(&args.meshes).check("--png", path)?;
     let Bodies {

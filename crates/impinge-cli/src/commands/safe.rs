@@ -88,7 +88,7 @@ pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
         // All that is near something else would show through.
         let color = |body: usize, corners: &[u32]| (color(body, corners).0, false);
         let surfaces = colors::surfaces(&bodies.scene, &named, color)?;
-        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, surfaces)?;
+        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.path, surfaces)?;
     }
     if ask.json {
         report::print(&answer.report()?)?;

@@ -244,7 +244,7 @@ impl<'a> Outputs<'a> {
         }
         if let Some(files) = &self.args.png {
             let file = files.frame(frame_ix).map_err(Error::Usage)?;
-            self.inputs.check_frame("--png", &file.0)?;
+            self.inputs.check_frame("--png", &file.path)?;
         }
         Ok(())
     }
@@ -270,7 +270,7 @@ impl<'a> Outputs<'a> {
         }
         if let (Some(files), Some(drawer)) = (&self.args.png, &mut self.drawer) {
             let file = files.frame(frame_ix).map_err(Error::Usage)?;
-            drawer.write(&file.0, scene, bodies, pairs)?;
+            drawer.write(&file.path, scene, bodies, pairs)?;
         }
         Ok(())
     }

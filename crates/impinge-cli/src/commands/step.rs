@@ -139,7 +139,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     if let Some(png) = &args.shown.png {
         let surfaces = colors::surfaces(&bodies.scene, &named, color)?;
         let device = args.detector.device.as_deref();
-        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, surfaces)?;
+        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.path, surfaces)?;
     }
     found.end(args.fail_on_hit)
 }

@@ -31,8 +31,8 @@ const DEMO_FRAMES: u32 = 300;
 pub fn view(args: &ViewArgs, cancel: &CancelToken) -> Result<(), Error> {
     let mut options = options(args);
     if let Some(file) = &args.png {
-        Inputs::new(&args.meshes).check("--png", &file.0)?;
-        return save(args, &options, &file.0, cancel);
+        Inputs::new(&args.meshes).check("--png", &file.path)?;
+        return save(args, &options, &file.path, cancel);
     }
     let (args, cancel) = (args.clone(), cancel.clone());
     let (again, token) = (args.clone(), cancel.clone());

@@ -154,8 +154,11 @@ impl CheckArgs {
             _ => None,
         };
         let summary = self.summary.as_deref().map(|path| ("--summary", path));
-        let html = self.html.as_ref().map(|file| ("--html", file.0.as_path()));
-        let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
+        let html = self
+            .html
+            .as_ref()
+            .map(|file| ("--html", file.path.as_path()));
+        let png = self.png.as_ref().map(|file| ("--png", file.path.as_path()));
         [mesh, summary, html, png].into_iter().flatten()
     }
 

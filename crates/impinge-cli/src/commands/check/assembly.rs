@@ -87,8 +87,8 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         )?;
     drop(watch);
     if let Some((file, meshes)) = shown {
-        write_assembly(&file.0, args, &names, &meshes, &answer)?;
-        say_wrote(&file.0, args)?;
+        write_assembly(&file.path, args, &names, &meshes, &answer)?;
+        say_wrote(&file.path, args)?;
     }
     if args.json {
         report::print(&report(args, &names, &answer))?;

@@ -5,7 +5,7 @@ use impinge_io::{ColoredMesh, Elements, write_obj, write_ply};
 
 use crate::error::Error;
 use crate::origins::Origin;
-use crate::values::ReachedFile;
+use crate::values::{ReachedFile, ReachedFormat};
 
 use super::load::Moving;
 
@@ -20,7 +20,7 @@ pub fn check((option, files): (&str, &[ReachedFile]), bodies: &Moving) -> Result
         return Err(Error::Usage(text));
     }
     let misfits = |(file, given): &(&ReachedFile, &Elements)| {
-        file.is_obj && matches!(given, Elements::Tetrahedra(_))
+        file.format == ReachedFormat::Obj && matches!(given, Elements::Tetrahedra(_))
     };
     match files.iter().zip(&bodies.given).find(misfits) {
         None => Ok(()),
@@ -47,7 +47,9 @@ pub fn write<'a>(
         let map = bodies.origins.of(ix).and_then(Origin::map);
         let positions = as_given(positions, map);
         match given {
-            Elements::Triangles(faces) if file.is_obj => write_obj(&file.path, &positions, faces)?,
+            Elements::Triangles(faces) if file.format == ReachedFormat::Obj => {
+                write_obj(&file.path, &positions, faces)?;
+            }
             elements => {
                 let mesh = ColoredMesh {
                     positions: &positions,
