@@ -1,7 +1,7 @@
 //! Surfaces of triangles. Closed ones face outward.
 
 use std::collections::HashMap;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use crate::model::{MAX_ELEMENTS, Mesh, Model, count, cross, index, normalised, real, to_f32};
 
@@ -9,41 +9,6 @@ use crate::model::{MAX_ELEMENTS, Mesh, Model, count, cross, index, normalised, r
 /// `subdivisions` times (at most 12). It has `20 * 4^subdivisions` triangles.
 pub fn icosphere(subdivisions: u32) -> Model {
     geodesic(1 << subdivisions.min(12)).model()
-}
-
-/// A sphere of radius 0.5 about the origin with `n_segments` meridians (at least 3) and `n_rings`
-/// bands from pole to pole (at least 2): `2 * n_segments * (n_rings - 1)` triangles. Those at
-/// the poles are thin.
-pub fn uv_sphere(n_segments: usize, n_rings: usize) -> Model {
-    let n_segments = n_segments.clamp(3, 1 << 14);
-    let n_rings = n_rings.clamp(2, 1 << 14);
-    let mut mesh = Mesh::default();
-    mesh.positions.push([0.0, 0.0, 0.5]);
-    for ring in 1..n_rings {
-        let (sin, cos) = (PI * real(ring) / real(n_rings)).sin_cos();
-        mesh.positions.extend((0..n_segments).map(|segment| {
-            let angle = TAU * real(segment) / real(n_segments);
-            to_f32([sin * angle.cos(), sin * angle.sin(), cos].map(|x| 0.5 * x))
-        }));
-    }
-    let south = index(mesh.positions.len());
-    mesh.positions.push([0.0, 0.0, -0.5]);
-    let at =
-        |ring: usize, segment: usize| index(1 + (ring - 1) * n_segments + segment % n_segments);
-    for segment in 0..n_segments {
-        mesh.faces.push([0, at(1, segment), at(1, segment + 1)]);
-        for ring in 1..n_rings - 1 {
-            let (a, b) = (at(ring, segment), at(ring, segment + 1));
-            let (c, d) = (at(ring + 1, segment), at(ring + 1, segment + 1));
-            mesh.faces.extend([[a, c, d], [a, d, b]]);
-        }
-        mesh.faces.push([
-            at(n_rings - 1, segment),
-            south,
-            at(n_rings - 1, segment + 1),
-        ]);
-    }
-    mesh.model()
 }
 
 /// A sphere of radius 0.5 about the origin with `n_triangles` triangles of about the same size:

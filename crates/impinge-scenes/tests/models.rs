@@ -85,13 +85,6 @@ fn closed_surfaces_are_closed_face_outward_and_have_their_euler_number() {
             2,
             sphere_volume,
         ),
-        (
-            "uv sphere",
-            surfaces::uv_sphere(40, 30),
-            2 * 40 * 29,
-            2,
-            sphere_volume,
-        ),
         ("ball", surfaces::ball(15_000), 15_000, 2, sphere_volume),
         ("small ball", surfaces::ball(78), 78, 2, sphere_volume),
         (
