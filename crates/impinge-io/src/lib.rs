@@ -68,6 +68,7 @@ mod write;
 pub use bodies::NamedMesh;
 pub use error::{Error, Location, Place, printable};
 pub use format::Format;
+pub use formats::ply::PlyLayout;
 pub use mesh::{Elements, Mesh, Positions, Weld, weld};
 pub use npy::{NpyHeader, npy_header};
 pub use numbers::{read_points, read_rows, read_rows_bytes};

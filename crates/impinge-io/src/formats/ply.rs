@@ -8,6 +8,7 @@
 
 mod header;
 
+pub use self::header::PlyLayout;
 use self::header::{Element, Header, Kind, Property, Storage};
 use crate::binary::{Cursor, Endian, Scalar};
 use crate::collect::{Collector, finite, vertex_ix};

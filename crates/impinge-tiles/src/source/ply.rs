@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use impinge_io::{Positions, Weld};
+use impinge_io::{PlyLayout, Positions, Weld};
 
 use super::{Source, check_count, head, length, read_at};
 use crate::chunk::{Chunk, Shape};
@@ -14,45 +14,22 @@ const HEADER: u64 = 1 << 16;
 pub struct Ply {
     path: PathBuf,
     positions: Positions,
-    n_faces: u64,
+    layout: PlyLayout,
     faces_start: u64,
-    face: FaceLayout,
-}
-
-/// The layout of a face.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct FaceLayout {
-    stride: usize,
-    /// The offset of the byte that holds the number of corners.
-    count: usize,
-    /// The offset of the first of three vertex numbers of 4 bytes.
-    vertices: usize,
-}
-
-/// The content of a header that this reader supports.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Layout {
-    start: u64,
-    n_vertices: u64,
-    vertex_stride: usize,
-    /// The offsets of x, y and z in a vertex.
-    offsets: [usize; 3],
-    is_f64: bool,
-    n_faces: u64,
-    face: FaceLayout,
 }
 
 impl Ply {
     /// `None` if the file has another flavour, which is read whole.
     pub fn open(path: &Path) -> Result<Option<Self>, Error> {
-        let Some(layout) = layout(&head(path, HEADER)?) else {
+        let layout = PlyLayout::parse(&head(path, HEADER)?).filter(|layout| layout.n_faces > 0);
+        let Some(layout) = layout else {
             return Ok(None);
         };
         check_count(path, "vertices", layout.n_vertices)?;
         check_count(path, "faces", layout.n_faces)?;
         let vertex_bytes = layout.n_vertices * layout.vertex_stride as u64;
         let faces_start = layout.start + vertex_bytes;
-        if length(path)? != faces_start + layout.n_faces * layout.face.stride as u64 {
+        if length(path)? != faces_start + layout.n_faces * layout.face_stride as u64 {
             // Faces of other lengths, or a file that is too short: the reader of whole files
             // decides.
             return Ok(None);
@@ -60,15 +37,14 @@ impl Ply {
         Ok(Some(Ply {
             path: path.to_owned(),
             positions: positions(path, &layout)?,
-            n_faces: layout.n_faces,
+            layout,
             faces_start,
-            face: layout.face,
         }))
     }
 }
 
 /// Reads only the positions, block by block.
-fn positions(path: &Path, layout: &Layout) -> Result<Positions, Error> {
+fn positions(path: &Path, layout: &PlyLayout) -> Result<Positions, Error> {
     const BLOCK: u64 = 1 << 18;
     let mut narrow: Vec<[f32; 3]> = Vec::new();
     let mut wide: Vec<[f64; 3]> = Vec::new();
@@ -78,10 +54,10 @@ fn positions(path: &Path, layout: &Layout) -> Result<Positions, Error> {
         let bytes = read_at(path, start, n * layout.vertex_stride)?;
         for vertex in bytes.chunks_exact(layout.vertex_stride) {
             if layout.is_f64 {
-                wide.push(layout.offsets.map(|at| super::f64_at(vertex, at)));
+                wide.push(layout.xyz.map(|at| super::f64_at(vertex, at)));
             } else {
                 let x = |at: usize| f32::from_le_bytes(std::array::from_fn(|ix| vertex[at + ix]));
-                narrow.push(layout.offsets.map(x));
+                narrow.push(layout.xyz.map(x));
             }
         }
     }
@@ -109,7 +85,7 @@ impl Source for Ply {
     }
 
     fn n_elements(&self) -> u64 {
-        self.n_faces
+        self.layout.n_faces
     }
 
     fn n_vertices(&self) -> u64 {
@@ -117,11 +93,12 @@ impl Source for Ply {
     }
 
     fn read(&self, first: u64, n: usize) -> Result<Option<Chunk>, Error> {
-        let FaceLayout {
-            stride,
-            count,
-            vertices: at,
-        } = self.face;
+        let PlyLayout {
+            face_stride: stride,
+            corners: count,
+            is_signed,
+            ..
+        } = self.layout;
         let bytes = read_at(
             &self.path,
             self.faces_start + first * stride as u64,
@@ -133,13 +110,18 @@ impl Source for Ply {
             if face[count] != 3 {
                 return Ok(None);
             }
-            for corner in 0..3 {
-                let vertex = u32::from_le_bytes(std::array::from_fn(|b| face[at + 4 * corner + b]));
-                let position = self.positions.get(vertex as usize);
+            for word in face[count + 1..].as_chunks().0.iter().take(3) {
+                let vertex = u32::from_le_bytes(*word);
+                let index = match is_signed {
+                    true => i64::from(vertex.cast_signed()),
+                    false => i64::from(vertex),
+                };
+                let position = usize::try_from(index).ok();
+                let position = position.and_then(|ix| self.positions.get(ix));
                 positions.push(position.ok_or_else(|| Error::VertexIndex {
                     path: self.path.clone(),
                     element: ix,
-                    index: i64::from(vertex),
+                    index,
                     n_vertices: self.n_vertices(),
                 })?);
                 vertices.push(vertex);
@@ -154,132 +136,5 @@ impl Source for Ply {
 
     fn weld(&self) -> Result<Weld, Error> {
         Ok(Weld::by_position(&self.positions))
-    }
-}
-
-/// Bytes of a scalar type.
-fn size(name: &str) -> Option<usize> {
-    Some(match name {
-        "char" | "uchar" | "int8" | "uint8" => 1,
-        "short" | "ushort" | "int16" | "uint16" => 2,
-        "int" | "uint" | "int32" | "uint32" | "float" | "float32" => 4,
-        "double" | "float64" => 8,
-        _ => return None,
-    })
-}
-
-/// Reads a header: vertices with x, y, z, then faces with one list of 4-byte vertex numbers, and
-/// nothing else.
-fn layout(head: &[u8]) -> Option<Layout> {
-    let end_mark = b"end_header\n";
-    let end = head
-        .windows(end_mark.len())
-        .position(|window| window == end_mark)?;
-    let text = std::str::from_utf8(&head[..end]).ok()?;
-    let mut lines = text
-        .lines()
-        .map(|line| line.split_ascii_whitespace().collect::<Vec<_>>());
-    if lines.next()? != ["ply"] || lines.next()? != ["format", "binary_little_endian", "1.0"] {
-        return None;
-    }
-    let (mut n_vertices, mut n_faces) = (None, None);
-    let (mut stride, mut offsets, mut types) = (0, [None; 3], Vec::new());
-    let (mut face_stride, mut list) = (0, None);
-    for line in lines {
-        match *line.as_slice() {
-            ["comment" | "obj_info", ..] | [] => {}
-            ["element", "vertex", n] if n_vertices.is_none() && n_faces.is_none() => {
-                n_vertices = n.parse::<u64>().ok();
-            }
-            ["element", "face", n] if n_vertices.is_some() && n_faces.is_none() => {
-                n_faces = n.parse::<u64>().ok();
-            }
-            [
-                "property",
-                "list",
-                "uchar" | "uint8",
-                "int" | "uint" | "int32" | "uint32",
-                "vertex_indices" | "vertex_index",
-            ] if n_faces.is_some() && list.is_none() => {
-                list = Some(face_stride);
-                face_stride += 1 + 12;
-            }
-            ["property", kind, name] => {
-                let size = size(kind)?;
-                if n_faces.is_some() {
-                    face_stride += size;
-                } else if n_vertices.is_some() {
-                    if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) {
-                        offsets[axis] = Some(stride);
-                        types.push(kind);
-                    }
-                    stride += size;
-                } else {
-                    return None;
-                }
-            }
-            _ => return None,
-        }
-    }
-    let is = |names: [&str; 2]| types.iter().all(|kind| names.contains(kind));
-    let is_f64 = is(["double", "float64"]);
-    let list = list?;
-    let [Some(x), Some(y), Some(z)] = offsets else {
-        return None;
-    };
-    (types.len() == 3 && (is_f64 || is(["float", "float32"])) && n_faces? > 0).then_some(())?;
-    Some(Layout {
-        start: (end + end_mark.len()) as u64,
-        n_vertices: n_vertices?,
-        vertex_stride: stride,
-        offsets: [x, y, z],
-        is_f64,
-        n_faces: n_faces?,
-        face: FaceLayout {
-            stride: face_stride,
-            count: list,
-            vertices: list + 1,
-        },
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn headers() {
-        let read = |text: &str| layout(text.as_bytes());
-        let text = "ply\nformat binary_little_endian 1.0\ncomment x\nelement vertex 4\nproperty float x\n\
-            property float y\nproperty float z\nproperty uchar red\nelement face 2\n\
-            property list uchar int vertex_indices\nproperty uchar green\nend_header\n";
-        let found = read(text).unwrap();
-        assert_eq!(
-            (found.vertex_stride, found.offsets, found.is_f64),
-            (13, [0, 4, 8], false)
-        );
-        let face = FaceLayout {
-            stride: 14,
-            count: 0,
-            vertices: 1,
-        };
-        assert_eq!(
-            (found.n_faces, found.face, found.start),
-            (2, face, text.len() as u64)
-        );
-        assert!(read(&text.replace("float", "double")).unwrap().is_f64);
-        for (old, new) in [
-            ("little", "big"),
-            ("float x", "double x"),
-            ("int vertex", "short vertex"),
-            ("float z", "float w"),
-            ("face 2", "edge 2"),
-            (
-                "element face 2\n",
-                "element edge 1\nproperty int a\nelement face 2\n",
-            ),
-        ] {
-            assert_eq!(read(&text.replace(old, new)), None, "{new}");
-        }
     }
 }

@@ -386,12 +386,10 @@ fn soups_are_welded_tile_by_tile_as_the_whole_would_be() {
     }
 }
 
-#[test]
-fn faces_of_many_corners_are_read_whole() {
-    // These faces have as many bytes as triangles with one more byte; only the count of corners
-    // distinguishes them.
+/// The plan of a PLY file of four vertices and one face.
+fn plan_of_face(corners: &[i32]) -> Result<Plan, Error> {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("quads.ply");
+    let path = folder.path().join("face.ply");
     let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
         property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
         .to_vec();
@@ -403,19 +401,36 @@ fn faces_of_many_corners_are_read_whole() {
     ] {
         bytes.extend(position.iter().flat_map(|x| x.to_le_bytes()));
     }
-    bytes.push(4);
-    bytes.extend([0u32, 1, 2, 3].iter().flat_map(|x| x.to_le_bytes()));
+    bytes.push(corners.len() as u8);
+    bytes.extend(corners.iter().flat_map(|x| x.to_le_bytes()));
     std::fs::write(&path, bytes).unwrap();
-    let made = plan(
+    plan(
         &folder.path().join("tiles"),
         &[path],
         &PlanOptions::default(),
     )
-    .unwrap();
+}
+
+#[test]
+fn faces_of_many_corners_are_read_whole() {
+    // These faces have as many bytes as triangles with one more byte; only the count of corners
+    // distinguishes them.
+    let made = plan_of_face(&[0, 1, 2, 3]).unwrap();
     assert_eq!(
         (made.files()[0].reader.as_str(), made.files()[0].n_elements),
         ("whole", 2)
     );
+}
+
+#[test]
+fn vertices_out_of_range_are_refused_by_the_number_in_the_file() {
+    for vertex in [4, -1] {
+        let error = plan_of_face(&[0, 1, vertex]).unwrap_err();
+        assert!(
+            matches!(error, Error::VertexIndex { index, n_vertices: 4, .. } if index == i64::from(vertex)),
+            "{error}"
+        );
+    }
 }
 
 #[test]

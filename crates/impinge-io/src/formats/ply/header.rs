@@ -175,6 +175,15 @@ fn read_property(name: Name, line: Line) -> Result<Property, Error> {
     }
 }
 
+/// Bytes of some properties, if none of them is a list.
+fn size_of_scalars(properties: &[Property]) -> Option<usize> {
+    let sizes = properties.iter().map(|property| match property {
+        Property::Scalar { scalar, .. } => Some(scalar.size()),
+        Property::List { .. } => None,
+    });
+    sizes.sum()
+}
+
 impl Element {
     fn read(name: Name, line: Line) -> Result<Self, Error> {
         let mut words = line.words().skip(1);
@@ -209,13 +218,7 @@ impl Element {
 
     /// Bytes per record, if all records have the same size.
     pub(super) fn stride(&self) -> Option<usize> {
-        self.properties
-            .iter()
-            .map(|property| match property {
-                Property::Scalar { scalar, .. } => Some(scalar.size()),
-                Property::List { .. } => None,
-            })
-            .sum()
+        size_of_scalars(&self.properties)
     }
 
     /// Bytes of the shortest possible record; at least 1 if there are properties.
@@ -282,5 +285,114 @@ impl Element {
             ));
         }
         Ok(Some(found))
+    }
+}
+
+/// Where binary PLY, little-endian, with vertices, then triangles, and nothing else has its data:
+/// all vertices have the same number of bytes, and so have all triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PlyLayout {
+    /// The offset of the first vertex in the file.
+    pub start: u64,
+    /// How many vertices follow each other there.
+    pub n_vertices: u64,
+    /// Bytes per vertex.
+    pub vertex_stride: usize,
+    /// The offsets of x, y and z in a vertex.
+    pub xyz: [usize; 3],
+    /// Whether these are f64, not f32.
+    pub is_f64: bool,
+    /// How many faces follow the vertices.
+    pub n_faces: u64,
+    /// Bytes per face, if it is a triangle.
+    pub face_stride: usize,
+    /// The offset in a face of the byte that holds its number of corners. Their vertices follow,
+    /// 4 bytes each.
+    pub corners: usize,
+    /// Whether these are i32, not u32.
+    pub is_signed: bool,
+}
+
+impl PlyLayout {
+    /// Reads the header at the beginning of a file; `None` if it is not whole or not valid, or if
+    /// the file can have another layout. Faces may have other numbers of corners.
+    pub fn parse(head: &[u8]) -> Option<Self> {
+        let name = Name("");
+        let mut text = Text::new(name, head);
+        let header = Header::read(name, &mut text).ok()?;
+        let [vertices, faces] = header.elements.as_slice() else {
+            return None;
+        };
+        let list = faces.vertex_list(name).ok()??;
+        let (before, rest) = faces.properties.split_at(list);
+        let Property::List { count, item, .. } = rest[0] else {
+            return None;
+        };
+        let xyz = vertices.xyz(name).ok()?;
+        let [x, y, z] = xyz.map(|(_, scalar)| scalar);
+        let is_known = header.storage == Storage::Binary(Endian::Little)
+            && vertices.kind == Kind::Vertices
+            && faces.kind == Kind::Faces
+            && x == y
+            && y == z
+            && matches!(x, Scalar::F32 | Scalar::F64)
+            && count == Scalar::U8
+            && matches!(item, Scalar::I32 | Scalar::U32);
+        let corners = size_of_scalars(before)?;
+        is_known.then_some(PlyLayout {
+            start: text.offset() as u64,
+            n_vertices: vertices.count,
+            vertex_stride: vertices.stride()?,
+            xyz: xyz.map(|(offset, _)| offset),
+            is_f64: x == Scalar::F64,
+            n_faces: faces.count,
+            face_stride: corners + 1 + 3 * item.size() + size_of_scalars(&rest[1..])?,
+            corners,
+            is_signed: item == Scalar::I32,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn layouts() {
+        let read = |text: &str| PlyLayout::parse(text.as_bytes());
+        let text = "ply\nformat binary_little_endian 1.0\ncomment x\nelement vertex 4\nproperty float x\n\
+            property float y\nproperty float z\nproperty uchar red\nelement face 2\nproperty uchar green\n\
+            property list uchar int vertex_indices\nproperty uchar blue\nend_header\n";
+        let expected = PlyLayout {
+            start: text.len() as u64,
+            n_vertices: 4,
+            vertex_stride: 13,
+            xyz: [0, 4, 8],
+            is_f64: false,
+            n_faces: 2,
+            face_stride: 15,
+            corners: 1,
+            is_signed: true,
+        };
+        assert_eq!(read(text), Some(expected));
+        assert!(read(&text.replace("float", "double")).unwrap().is_f64);
+        let unsigned = text.replace("int vertex", "uint vertex");
+        assert!(!read(&unsigned).unwrap().is_signed);
+        for (old, new) in [
+            ("little", "big"),
+            ("float x", "double x"),
+            ("uchar int", "int int"),
+            ("int vertex", "short vertex"),
+            ("float z", "float w"),
+            ("face 2", "edge 2"),
+            ("uchar blue", "list uchar int blue"),
+            (
+                "element face 2\n",
+                "element edge 1\nproperty int a\nelement face 2\n",
+            ),
+            ("end_header\n", ""),
+        ] {
+            assert_eq!(read(&text.replace(old, new)), None, "{new}");
+        }
     }
 }
