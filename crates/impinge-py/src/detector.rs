@@ -38,6 +38,20 @@ type Nearest<'py> = (f64, Body, u32, Body, u32, Bound<'py, PyArray2<f64>>);
 /// Keywords of a question.
 type Keywords<'a, 'py> = &'a Bound<'py, PyDict>;
 
+/// Asks a method of detectors where points are in a body.
+macro_rules! of_points {
+    ($method:ident, $detector:expr, $asked:expr, $keywords:expr) => {
+        ask_of_body(
+            $detector,
+            $asked,
+            $keywords,
+            |detector, scene, body, points| {
+                with_rows!(points, |points| detector.$method(scene, body, points))
+            },
+        )?
+    };
+}
+
 #[pymethods]
 impl DetectorBase {
     #[new]
@@ -56,12 +70,8 @@ impl DetectorBase {
         scene: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Pairs> {
-        let asked = ask(
-            slf,
-            scene,
-            Options::new(keywords)?,
-            |detector, scene, query| detector.detect(scene, query),
-        )?;
+        let options = Options::new(keywords)?;
+        let asked = ask(slf, scene, options, impinge::Detector::detect)?;
         Ok(Pairs::new(asked.answer, asked.scene))
     }
 
@@ -70,12 +80,8 @@ impl DetectorBase {
         scene: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<u64> {
-        let asked = ask(
-            slf,
-            scene,
-            Options::new(keywords)?,
-            |detector, scene, query| detector.count(scene, query),
-        )?;
+        let options = Options::new(keywords)?;
+        let asked = ask(slf, scene, options, impinge::Detector::count)?;
         Ok(asked.answer)
     }
 
@@ -84,12 +90,8 @@ impl DetectorBase {
         scene: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<bool> {
-        let asked = ask(
-            slf,
-            scene,
-            Options::new(keywords)?,
-            |detector, scene, query| detector.any(scene, query),
-        )?;
+        let options = Options::new(keywords)?;
+        let asked = ask(slf, scene, options, impinge::Detector::any)?;
         Ok(asked.answer)
     }
 
@@ -100,9 +102,7 @@ impl DetectorBase {
     ) -> PyResult<Impacts> {
         let options = Options::new(keywords)?;
         let is_double = options.precision == Precision::F64;
-        let asked = ask(slf, scene, options, |detector, scene, query| {
-            detector.impacts(scene, query)
-        })?;
+        let asked = ask(slf, scene, options, impinge::Detector::impacts)?;
         Ok(Impacts::new(asked.answer, asked.scene, is_double))
     }
 
@@ -111,12 +111,8 @@ impl DetectorBase {
         scene: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Option<Row>> {
-        let asked = ask(
-            slf,
-            scene,
-            Options::new(keywords)?,
-            |detector, scene, query| detector.earliest(scene, query),
-        )?;
+        let options = Options::new(keywords)?;
+        let asked = ask(slf, scene, options, impinge::Detector::earliest)?;
         Ok(asked.answer.map(|found| impact(&found, asked.scene)))
     }
 
@@ -125,12 +121,8 @@ impl DetectorBase {
         scene: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<bool> {
-        let asked = ask(
-            slf,
-            scene,
-            Options::new(keywords)?,
-            |detector, scene, query| detector.is_free(scene, query),
-        )?;
+        let options = Options::new(keywords)?;
+        let asked = ask(slf, scene, options, impinge::Detector::is_free)?;
         Ok(asked.answer)
     }
 
@@ -139,12 +131,8 @@ impl DetectorBase {
         scene: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Advance> {
-        let asked = ask(
-            slf,
-            scene,
-            Options::new(keywords)?,
-            |detector, scene, query| detector.advance(scene, query),
-        )?;
+        let options = Options::new(keywords)?;
+        let asked = ask(slf, scene, options, impinge::Detector::advance)?;
         Ok(Advance::new(asked.answer, asked.scene))
     }
 
@@ -153,12 +141,8 @@ impl DetectorBase {
         scene: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Truncation> {
-        let asked = ask(
-            slf,
-            scene,
-            Options::new(keywords)?,
-            |detector, scene, query| detector.truncate(scene, query),
-        )?;
+        let options = Options::new(keywords)?;
+        let asked = ask(slf, scene, options, impinge::Detector::truncate)?;
         Ok(Truncation::new(asked.answer, asked.scene))
     }
 
@@ -169,12 +153,10 @@ impl DetectorBase {
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Candidates> {
         let inflation = length(inflation, "inflation")?;
-        let asked = ask(
-            slf,
-            scene,
-            Options::new(keywords)?,
-            |detector, scene, query| detector.candidates(scene, inflation, query),
-        )?;
+        let options = Options::new(keywords)?;
+        let asked = ask(slf, scene, options, |detector, scene, query| {
+            detector.candidates(scene, inflation, query)
+        })?;
         Ok(Candidates::new(asked.answer))
     }
 
@@ -283,9 +265,7 @@ impl DetectorBase {
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Option<Nearest<'py>>> {
         let options = Options::new(keywords)?.between_all();
-        let asked = ask(slf, scene, options, |detector, scene, query| {
-            detector.nearest(scene, query)
-        })?;
+        let asked = ask(slf, scene, options, impinge::Detector::nearest)?;
         nearest(slf.py(), asked)
     }
 
@@ -296,14 +276,7 @@ impl DetectorBase {
         points: &Bound<'py, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Bound<'py, PyArray1<i8>>> {
-        let places = ask_of_body(
-            slf,
-            (scene, body, points),
-            keywords,
-            |detector, scene, body, points| {
-                with_rows!(points, |points| detector.contains(scene, body, points))
-            },
-        )?;
+        let places = of_points!(contains, slf, (scene, body, points), keywords);
         Ok(PyArray1::from_vec(slf.py(), places))
     }
 
@@ -314,15 +287,7 @@ impl DetectorBase {
         points: &Bound<'py, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let distances = ask_of_body(
-            slf,
-            (scene, body, points),
-            keywords,
-            |detector, scene, body, points| {
-                with_rows!(points, |points| detector
-                    .signed_distance(scene, body, points))
-            },
-        )?;
+        let distances = of_points!(signed_distance, slf, (scene, body, points), keywords);
         Ok(PyArray1::from_vec(slf.py(), distances))
     }
 
@@ -333,15 +298,7 @@ impl DetectorBase {
         points: &Bound<'py, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Bound<'py, PyArray1<i32>>> {
-        let found = ask_of_body(
-            slf,
-            (scene, body, points),
-            keywords,
-            |detector, scene, body, points| {
-                with_rows!(points, |points| detector
-                    .winding_numbers(scene, body, points))
-            },
-        )?;
+        let found = of_points!(winding_numbers, slf, (scene, body, points), keywords);
         let numbers = found.iter().map(|winding| winding.unwrap_or(i32::MIN));
         Ok(PyArray1::from_vec(slf.py(), collect(found.len(), numbers)?))
     }
@@ -353,14 +310,7 @@ impl DetectorBase {
         points: &Bound<'py, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
-        let found = ask_of_body(
-            slf,
-            (scene, body, points),
-            keywords,
-            |detector, scene, body, points| {
-                with_rows!(points, |points| detector.locate(scene, body, points))
-            },
-        )?;
+        let found = of_points!(locate, slf, (scene, body, points), keywords);
         let numbers = found.iter().map(|found| found.map_or(-1, i64::from));
         Ok(PyArray1::from_vec(slf.py(), collect(found.len(), numbers)?))
     }
