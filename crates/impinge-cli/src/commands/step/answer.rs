@@ -255,7 +255,7 @@ const MOST_WAYS: usize = 4;
 fn ways(bodies: &Moving) -> String {
     let names = bodies.names.iter().take(MOST_WAYS);
     let way = |names: &[String; 2]| {
-        let [start, end] = names.each_ref().map(|name| printable(name));
+        let [start, end] = names.each_ref().map(printable);
         match start == end {
             true => format!("{start} stays"),
             false => format!("{start} moves to {end}"),
