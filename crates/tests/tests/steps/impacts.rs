@@ -9,7 +9,8 @@ use impinge_core::{
     Backend, BodyId, CancelToken, Candidates, Control, Detector, Element, Elements, Error, Method,
     PairFilter, PairKind, Part, Positions, Precision, Query, Scene, Settings, Start,
 };
-use impinge_tests::{Size, detector, detectors, landing, times_power};
+use impinge_scenes::Random;
+use impinge_tests::{Size, cpu, detector, detectors, landing, times_power};
 
 const FACE: [[u32; 3]; 1] = [[0, 1, 2]];
 const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
@@ -1221,4 +1222,60 @@ fn a_step_is_its_two_halves() {
             .collect();
         assert_eq!(whole, expected, "seed {seed}");
     }
+}
+
+/// What a refused or cancelled question has left undecided is not decided by the next one.
+#[test]
+fn a_refused_question_leaves_nothing_to_the_next() {
+    let soup = |random: &mut Random, scene: &mut Scene| {
+        let mut at = || random.below(13) as f32 / 4.0;
+        let points = Vec::from_iter((0..40).map(|_| [at(), at(), at()]));
+        let mut faces: Vec<[u32; 3]> = Vec::new();
+        while faces.len() < 60 {
+            let face = [0; 3].map(|_| random.below(40) as u32);
+            if face[0] != face[1] && face[1] != face[2] && face[2] != face[0] {
+                faces.push(face);
+            }
+        }
+        scene.add_triangles(&faces, &points).expect("good")
+    };
+    let mut n_refused = 0;
+    for seed in 0..8 {
+        let (mut random, mut scene) = (Random::new(seed), Scene::new());
+        let bodies = [0; 2].map(|_| soup(&mut random, &mut scene));
+        for threads in [1, 3] {
+            let settings = cpu(Method::Auto, threads).max_pairs(Some(100));
+            let mut detector = Detector::new(settings.clone()).expect("settings");
+            let refuse = |detector: &mut Detector| {
+                let wide = Query::all().separation(0.25);
+                let refused = detector.impacts(&scene, &wide);
+                u32::from(matches!(refused, Err(Error::TooManyPairs { .. })))
+            };
+            let own = Query::self_of(bodies[0]);
+            let near = own.clone().kinds([PairKind::VertexFace]);
+            let mut fresh = Detector::new(settings).expect("settings");
+            let hash = |detector: &mut Detector| {
+                let near = detector.near(&scene, 0.0, &near).map(|near| near.hash());
+                near.map_err(|error| error.to_string())
+            };
+            n_refused += refuse(&mut detector);
+            assert_eq!(hash(&mut detector), hash(&mut fresh));
+            n_refused += refuse(&mut detector);
+            let lists = |detector: &mut Detector| {
+                let lists = detector.neighbours(&scene, 0.0, &near);
+                lists
+                    .map(|lists| lists.vf().clone())
+                    .map_err(|error| error.to_string())
+            };
+            assert_eq!(lists(&mut detector), lists(&mut fresh));
+            n_refused += refuse(&mut detector);
+            let safe = |detector: &mut Detector| {
+                let safe = detector.safe_distances(&scene, 0.1, &near);
+                safe.map(|safe| format!("{:?}", safe.of(bodies[0])))
+                    .map_err(|error| error.to_string())
+            };
+            assert_eq!(safe(&mut detector), safe(&mut fresh));
+        }
+    }
+    assert_eq!(n_refused, 48);
 }

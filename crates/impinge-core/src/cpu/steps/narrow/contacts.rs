@@ -69,15 +69,21 @@ impl FirstContacts {
         self.most_close = MOST_CLOSE.max(2 * n_clusters as usize);
         self.full = tuning.decide_from;
         self.counts = NarrowCounts::default();
+        for list in [&mut self.open, &mut self.later, &mut self.single] {
+            list.reserve_exact(waiting_capacity(tuning));
+        }
+        self.is_last = false;
+    }
+
+    /// Drops what a question has left that was cancelled or refused.
+    pub fn forget(&mut self) {
         self.found.iter_mut().for_each(Vec::clear);
         for list in [&mut self.open, &mut self.later, &mut self.single] {
             list.clear();
-            list.reserve_exact(waiting_capacity(tuning));
         }
         self.between = None;
         self.unsure.clear();
         self.close.clear();
-        self.is_last = false;
     }
 
     pub fn bytes(&self) -> usize {

@@ -52,6 +52,8 @@ impl StepDecider {
         self.question = plan.question;
         self.n_candidates = 0;
         self.listing.begin();
+        // Unsure contacts are decided at the end of every question.
+        self.contacts.forget();
         match self.question {
             Question::Contact => self.contacts.begin(n_clusters, plan, tuning),
             Question::Overlap => self.overlaps.begin(),
