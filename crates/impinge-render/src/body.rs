@@ -3,6 +3,7 @@
 use impinge::{Body, Elements};
 
 use crate::error::Error;
+use crate::faces::Faces;
 use crate::picture::{Face, Normals, Surface};
 
 /// The two colours of a body, sRGB.
@@ -17,8 +18,7 @@ pub struct Colors {
 impl Surface {
     /// A body in its current pose; its `colliding` elements are coloured and show through.
     ///
-    /// Triangles are drawn with smooth normals. Tetrahedra are drawn with flat faces: the faces of
-    /// only one tetrahedron, and all faces of colliding tetrahedra.
+    /// As [`Surface::of_elements`].
     ///
     /// # Errors
     /// A number in `colliding` that the body does not have.
@@ -36,79 +36,58 @@ impl Surface {
                 }
             }
         }
-        let face = |corners, collides| Face {
-            corners,
-            color: if collides {
-                colors.colliding
-            } else {
-                colors.other
-            },
-            shows_through: collides,
+        let positions = (0..body.n_vertices()).map(|ix| body.positions().point(ix));
+        let color = |element: usize| match collides[element] {
+            true => (colors.colliding, true),
+            false => (colors.other, false),
         };
-        let positions = body.positions();
-        Ok(Surface {
-            positions: (0..body.n_vertices())
-                .map(|ix| positions.point(ix))
-                .collect(),
-            faces: match body.elements() {
-                Elements::Triangles(faces) => faces
-                    .iter()
-                    .zip(&collides)
-                    .map(|(&corners, &collides)| face(corners, collides))
-                    .collect(),
-                Elements::Tetrahedra(tets) => shown_sides(tets, &collides)
-                    .map(|side| face(side.corners, side.collides))
-                    .collect(),
-                // Edges and points have no surface to show.
-                Elements::Edges(_) | Elements::Points(_) => Vec::new(),
-            },
-            normals: match body.elements() {
+        Ok(Surface::of_elements(
+            positions.collect(),
+            body.elements(),
+            color,
+        ))
+    }
+
+    /// Elements with a `color` each, and whether they show through.
+    ///
+    /// Triangles are drawn with smooth normals. Tetrahedra are drawn with flat faces: the faces of
+    /// only one tetrahedron, and all faces of tetrahedra that show through. Edges and points have
+    /// no surface to show.
+    pub fn of_elements(
+        positions: Vec<[f64; 3]>,
+        elements: &Elements,
+        color: impl Fn(usize) -> ([u8; 3], bool),
+    ) -> Self {
+        let faces = Faces::of_elements(elements, positions.len());
+        let shows = |element: u32| color(element as usize).1;
+        // Of each face that is drawn the element whose colour it has.
+        let owner = |face| faces.element(face).filter(|_| !faces.is_inner(face));
+        let mut owners: Vec<Option<u32>> = (0..faces.len()).map(owner).collect();
+        for element in (0u32..).take(elements.len()).filter(|&ix| shows(ix)) {
+            for face in faces.of_element(element) {
+                // Of two that show through, the first.
+                if owners[face].is_none_or(|owner| !shows(owner)) {
+                    owners[face] = Some(element);
+                }
+            }
+        }
+        let drawn = owners.into_iter().enumerate().filter_map(|(ix, owner)| {
+            let (color, shows_through) = color(owner? as usize);
+            Some(Face {
+                corners: faces.corners(ix)?,
+                color,
+                shows_through,
+            })
+        });
+        Surface {
+            positions,
+            faces: drawn.collect(),
+            normals: match elements {
                 Elements::Triangles(_) => Normals::Smooth,
                 _ => Normals::Flat,
             },
-        })
+        }
     }
-}
-
-/// A face of a tetrahedron.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Side {
-    /// The corners in ascending order: the same for both tetrahedra that share the face.
-    key: [u32; 3],
-    corners: [u32; 3],
-    collides: bool,
-}
-
-/// The faces of only one tetrahedron, and the faces of colliding tetrahedra, each once.
-fn shown_sides(tets: &[[u32; 4]], collides: &[bool]) -> impl Iterator<Item = Side> {
-    let mut sides: Vec<Side> = tets
-        .iter()
-        .zip(collides)
-        .flat_map(|(&[a, b, c, d], &collides)| {
-            [[a, c, b], [a, b, d], [b, c, d], [c, a, d]].map(|corners| {
-                let mut key = corners;
-                key.sort_unstable();
-                Side {
-                    key,
-                    corners,
-                    collides,
-                }
-            })
-        })
-        .collect();
-    // The sort is stable: of two tetrahedra that share a face, the first one's side is drawn.
-    sides.sort_by_key(|side| side.key);
-    let shown: Vec<Side> = sides
-        .chunk_by(|a, b| a.key == b.key)
-        .filter_map(|same| {
-            let collides = same.iter().any(|side| side.collides);
-            (same.len() == 1 || collides).then_some(Side {
-                collides,
-                ..same[0]
-            })
-        })
-        .collect();
-    shown.into_iter()
 }
 
 #[cfg(test)]
@@ -117,19 +96,26 @@ mod tests {
 
     #[test]
     fn two_tetrahedra_have_six_sides_and_seven_where_they_collide() {
-        let tets = [[0, 1, 2, 3], [1, 2, 3, 4]];
-        let corners = |collides: [bool; 2]| {
-            let shown: Vec<Side> = shown_sides(&tets, &collides).collect();
-            let n_colliding = shown.iter().filter(|side| side.collides).count();
-            (shown.len(), n_colliding)
+        let elements = Elements::from(vec![[0, 1, 2, 3], [1, 2, 3, 4]]);
+        let sides = |shows: [bool; 2]| {
+            let color = |element: usize| ([element as u8; 3], shows[element]);
+            Surface::of_elements(vec![[0.0; 3]; 5], &elements, color).faces
         };
-        assert_eq!(corners([false, false]), (6, 0));
-        assert_eq!(corners([true, false]), (7, 4));
-        assert_eq!(corners([false, true]), (7, 4));
-        assert_eq!(corners([true, true]), (7, 7));
-        let keys: Vec<_> = shown_sides(&tets, &[false, false])
-            .map(|side| side.key)
-            .collect();
-        assert!(!keys.contains(&[1, 2, 3]), "{keys:?}");
+        let counts = |shows: [bool; 2]| {
+            let sides = sides(shows);
+            let n_through = sides.iter().filter(|side| side.shows_through).count();
+            (sides.len(), n_through)
+        };
+        assert_eq!(counts([false, false]), (6, 0));
+        assert_eq!(counts([true, false]), (7, 4));
+        assert_eq!(counts([false, true]), (7, 4));
+        assert_eq!(counts([true, true]), (7, 7));
+        let shared = |side: &&Face| [1, 2, 3].iter().all(|vertex| side.corners.contains(vertex));
+        assert_eq!(sides([false, false]).iter().find(shared), None);
+        for (shows, owner) in [([true, false], 0), ([false, true], 1), ([true, true], 0)] {
+            let sides = sides(shows);
+            let shared = sides.iter().find(shared).expect("drawn");
+            assert_eq!((shared.color, shared.shows_through), ([owner; 3], true));
+        }
     }
 }

@@ -49,6 +49,7 @@ mod corners;
 #[cfg(feature = "gpu")]
 mod device;
 mod error;
+mod faces;
 mod image;
 #[cfg(feature = "gpu")]
 mod live;
@@ -68,12 +69,13 @@ mod view;
 pub use body::Colors;
 pub use camera::{Camera, Focus, Projection, UpAxis};
 pub use error::Error;
+pub use faces::Faces;
 pub use image::Image;
 /// The GPU interface of [`Renderer::with_device`] and [`Live`].
 #[cfg(feature = "gpu")]
 pub use impinge::wgpu;
 #[cfg(feature = "gpu")]
-pub use live::{Faces, Live, Look};
+pub use live::{Live, Look};
 pub use orbit::Orbit;
 pub use picture::{Face, Normals, Picture, Surface};
 #[doc(hidden)]

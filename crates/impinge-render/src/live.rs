@@ -1,6 +1,5 @@
 //! Bodies drawn again and again while they move.
 
-mod faces;
 mod pipelines;
 
 use impinge::{Positions, wgpu};
@@ -8,8 +7,8 @@ use impinge::{Positions, wgpu};
 use crate::body::Colors;
 use crate::camera::Projection;
 use crate::error::Error;
+use crate::faces::Faces;
 
-pub use faces::Faces;
 pub(crate) use pipelines::SHADERS;
 use pipelines::{BodyUniform, DEPTH, N_STORAGE_BUFFERS, Pipelines, ViewUniform};
 

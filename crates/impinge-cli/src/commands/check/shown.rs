@@ -6,12 +6,12 @@ use std::io::Write;
 use std::path::Path;
 
 use impinge_check::{Checked, Problem, Row};
-use impinge_io::{ColoredMesh, Elements};
-
-use impinge_render::{Face, Normals, Surface};
+use impinge_io::ColoredMesh;
+use impinge_render::Surface;
 
 use super::args::CheckArgs;
 use crate::error::Error;
+use crate::load::to_elements;
 use crate::meshes::write_colored;
 use crate::output::out;
 use crate::values::MeshFile;
@@ -92,30 +92,41 @@ pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
 
 /// A mesh in these colours.
 pub fn surface(checked: &Checked) -> Surface {
-    const SIDES: [[usize; 3]; 4] = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
-    let face = |corners: [u32; 3], element: usize| Face {
-        corners,
-        color: color(checked, element),
-        shows_through: checked.marks[element].first().is_some(),
-    };
-    let (faces, normals) = match &checked.mesh.elements {
-        Elements::Triangles(triangles) => {
-            let faces = triangles
-                .iter()
-                .enumerate()
-                .map(|(ix, &corners)| face(corners, ix));
-            (faces.collect(), Normals::Smooth)
-        }
-        Elements::Tetrahedra(tets) => {
-            let sides = tets.iter().enumerate().flat_map(|(ix, corners)| {
-                SIDES.map(|side| face(side.map(|corner| corners[corner]), ix))
-            });
-            (sides.collect(), Normals::Flat)
-        }
-    };
-    Surface {
-        positions: checked.mesh.positions.to_f64(),
-        faces,
-        normals,
+    let mesh = &checked.mesh;
+    let elements = to_elements(mesh.elements.clone());
+    Surface::of_elements(mesh.positions.to_f64(), &elements, |element| {
+        let is_marked = checked.marks[element].first().is_some();
+        (color(checked, element), is_marked)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use impinge_check::{Options, check_mesh};
+    use impinge_io::{Elements, Mesh, Positions};
+
+    use super::*;
+
+    #[test]
+    fn faces_between_tetrahedra_are_drawn_only_where_there_is_a_problem() {
+        let points = vec![
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [1.0, 1.0, 1.0],
+        ];
+        let counts = |tets: &[[u32; 4]]| {
+            let mesh = Mesh {
+                positions: Positions::F32(points.clone()),
+                elements: Elements::Tetrahedra(tets.to_vec()),
+            };
+            let faces = surface(&check_mesh(mesh, &Options::default()).unwrap()).faces;
+            let n_through = faces.iter().filter(|face| face.shows_through).count();
+            (faces.len(), n_through)
+        };
+        assert_eq!(counts(&[[0, 1, 2, 3], [4, 1, 3, 2]]), (6, 0));
+        // The second one twice: all three are at the face that the two had between them.
+        assert_eq!(counts(&[[0, 1, 2, 3], [4, 1, 3, 2], [4, 1, 3, 2]]), (7, 7));
     }
 }

@@ -27,12 +27,17 @@ pub struct Faces {
 impl Faces {
     /// The faces of a body.
     pub fn of_body(body: &Body) -> Self {
+        Faces::of_elements(body.elements(), body.n_vertices())
+    }
+
+    /// The faces of elements of so many vertices.
+    pub fn of_elements(elements: &Elements, n_vertices: usize) -> Self {
         let mut faces = Faces {
-            n_elements: body.n_elements(),
-            n_vertices: body.n_vertices(),
+            n_elements: elements.len(),
+            n_vertices,
             ..Faces::default()
         };
-        match body.elements() {
+        match elements {
             Elements::Triangles(triangles) => {
                 faces.corners = triangles.iter().map(|&[a, b, c]| [a, b, c, 0]).collect();
                 faces.owners = (0u32..).take(triangles.len()).collect();
@@ -114,6 +119,7 @@ impl Faces {
     }
 
     /// As the shader reads them.
+    #[cfg(feature = "gpu")]
     pub(crate) fn packed(&self) -> &[[u32; 4]] {
         &self.corners
     }
