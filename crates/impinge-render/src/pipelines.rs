@@ -191,41 +191,56 @@ fn pipeline(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
+    use naga::AddressSpace::Uniform;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
-    use naga::{AddressSpace, TypeInner};
+    use naga::{StructMember, TypeInner};
 
     use super::*;
 
+    /// Names and offsets of the members of a struct, and its size.
+    pub type Layout = (Vec<(String, usize)>, usize);
+
+    /// The layout of a struct of the host with all of its members.
+    macro_rules! layout_here {
+        ($host:ident: $($name:ident)*) => {
+            (
+                vec![$((stringify!($name).to_owned(), std::mem::offset_of!($host, $name))),*],
+                size_of::<$host>(),
+            )
+        };
+    }
+    pub(crate) use layout_here;
+
+    /// The layout of a uniform of that type in a valid shader.
+    pub fn layout_in(shader: &str, uniform: &str) -> Option<Layout> {
+        let (_, text) = shaders().find(|(name, _)| *name == shader)?;
+        let module = naga::front::wgsl::parse_str(&text)
+            .unwrap_or_else(|error| panic!("{shader}: {}", error.emit_to_string(&text)));
+        Validator::new(ValidationFlags::all(), Capabilities::empty())
+            .validate(&module)
+            .unwrap_or_else(|error| panic!("{shader}: {}", error.emit_to_string(&text)));
+        let uniforms = module.global_variables.iter();
+        let mut types = uniforms
+            .filter(|(_, variable)| variable.space == Uniform)
+            .map(|(_, variable)| &module.types[variable.ty]);
+        let ty = types.find(|ty| ty.name.as_deref() == Some(uniform))?;
+        let TypeInner::Struct { members, span } = &ty.inner else {
+            return None;
+        };
+        let member = |member: &StructMember| {
+            let name = member.name.clone().unwrap_or_default();
+            (name, member.offset as usize)
+        };
+        Some((members.iter().map(member).collect(), *span as usize))
+    }
+
     #[test]
     fn shaders_are_valid_and_know_the_frame_as_the_host_does() {
-        for (name, text) in SHADERS {
-            let module = naga::front::wgsl::parse_str(text)
-                .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(text)));
-            Validator::new(ValidationFlags::all(), Capabilities::empty())
-                .validate(&module)
-                .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(text)));
-            let (_, uniform) = module
-                .global_variables
-                .iter()
-                .find(|(_, variable)| variable.space == AddressSpace::Uniform)
-                .expect(name);
-            let TypeInner::Struct { members, span } = &module.types[uniform.ty].inner else {
-                panic!("{name}: the frame is a struct");
-            };
-            assert_eq!(*span as usize, size_of::<FrameUniform>(), "{name}");
-            let offsets = std::mem::offset_of!(FrameUniform, right)..;
-            let names =
-                "right up back projection sky background_top background_bottom picture amounts";
-            for ((member, name), offset) in members
-                .iter()
-                .zip(names.split(' '))
-                .zip(offsets.step_by(16))
-            {
-                assert_eq!(member.name.as_deref(), Some(name));
-                assert_eq!(member.offset as usize, offset);
-            }
-            assert_eq!(members.len(), names.split(' ').count());
+        let frame = layout_here!(FrameUniform: right up back projection sky background_top
+            background_bottom picture amounts);
+        for (name, _) in SHADERS {
+            assert_eq!(layout_in(name, "Frame"), Some(frame.clone()), "{name}");
         }
     }
 }

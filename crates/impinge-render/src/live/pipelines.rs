@@ -197,53 +197,15 @@ fn pipeline(
 
 #[cfg(test)]
 mod tests {
-    use naga::valid::{Capabilities, ValidationFlags, Validator};
-    use naga::{AddressSpace, TypeInner};
-
     use super::*;
-
-    /// Names and offsets of the members of a shader's uniform of that type, and its size.
-    fn layout_of(name: &str, uniform: &str) -> Option<(Vec<(String, usize)>, usize)> {
-        let (_, text) = SHADERS.iter().find(|(held, _)| *held == name)?;
-        let module = naga::front::wgsl::parse_str(text)
-            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(text)));
-        Validator::new(ValidationFlags::all(), Capabilities::empty())
-            .validate(&module)
-            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(text)));
-        module.global_variables.iter().find_map(|(_, variable)| {
-            let ty = &module.types[variable.ty];
-            match &ty.inner {
-                TypeInner::Struct { members, span }
-                    if variable.space == AddressSpace::Uniform
-                        && ty.name.as_deref() == Some(uniform) =>
-                {
-                    let member = |member: &naga::StructMember| {
-                        (
-                            member.name.clone().unwrap_or_default(),
-                            member.offset as usize,
-                        )
-                    };
-                    Some((members.iter().map(member).collect(), *span as usize))
-                }
-                _ => None,
-            }
-        })
-    }
+    use crate::pipelines::tests::{layout_here, layout_in};
 
     #[test]
     fn shaders_are_valid_and_know_the_uniforms_as_the_host_does() {
-        macro_rules! members {
-            ($host:ident: $($name:ident)*) => {
-                (
-                    vec![$((stringify!($name).to_owned(), std::mem::offset_of!($host, $name))),*],
-                    size_of::<$host>(),
-                )
-            };
-        }
-        let view = members!(ViewUniform: right up back projection sky screen line only_marked);
-        assert_eq!(layout_of("live_faces", "View"), Some(view.clone()));
-        assert_eq!(layout_of("live_lines", "View"), Some(view));
-        let body = members!(BodyUniform: other marked has_colors place);
-        assert_eq!(layout_of("live_faces", "Body"), Some(body));
+        let view = layout_here!(ViewUniform: right up back projection sky screen line only_marked);
+        assert_eq!(layout_in("live_faces", "View"), Some(view.clone()));
+        assert_eq!(layout_in("live_lines", "View"), Some(view));
+        let body = layout_here!(BodyUniform: other marked has_colors place);
+        assert_eq!(layout_in("live_faces", "Body"), Some(body));
     }
 }
