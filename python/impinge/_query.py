@@ -113,8 +113,8 @@ class Query:
     exclude : (Body, Body), Exclusion, or sequence of these
         What is left out before it is decided. Bodies: their pairs; a body named twice leaves out its self-collision. ``rings(n)``: pairs
         that are near in the surface. ``groups(g, h)``: groups of vertices that do not meet. ``scene.rest_pairs(r)``: pairs that were
-        near at rest; of `Detector.detect`, `count` and `any` the faces without a common vertex that were within that distance, and of
-        tetrahedra only those at the surface. These three find all pairs first, so that limits count what is left out, too. Several `groups` are one rule: see there. `Detector.nearest` takes bodies alone.
+        near at rest; of `Detector.detect`, `count` and `any` the elements of which a corner, an edge or a face was in such a pair. These
+        three find all pairs first, so that limits count what is left out, too. Several `groups` are one rule: see there. `Detector.nearest` takes bodies alone.
         Nothing is proven of pairs that are left out: a step that is free (`Detector.is_free`), or that `Detector.truncate`, `advance` or
         `safe_distances` allow, may take them through each other.
     owned_by : (low, high)
