@@ -1232,7 +1232,7 @@ fn a_refused_question_leaves_nothing_to_the_next() {
         let points = Vec::from_iter((0..40).map(|_| [at(), at(), at()]));
         let mut faces: Vec<[u32; 3]> = Vec::new();
         while faces.len() < 60 {
-            let face = [0; 3].map(|_| random.below(40) as u32);
+            let face = [0; 3].map(|_| random.below(40));
             if face[0] != face[1] && face[1] != face[2] && face[2] != face[0] {
                 faces.push(face);
             }
