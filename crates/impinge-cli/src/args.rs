@@ -231,14 +231,15 @@ const SEQUENCE_EXAMPLES: &str = "\
 Examples:
   impinge sequence body.ply run.pc2
   impinge sequence body.ply run.pc2 --other floor.obj --self
+  impinge sequence body.ply run.pc2 --moving hair.ply hair.pc2 --ccd
   impinge sequence body.obj frames_0001.obj --frames 10..20 --json
   impinge sequence body.obj 'frames_%04d.obj' --json | head
   impinge sequence body.ply run.pc2 --rows pairs.csv --out seen_%04d.ply
   impinge sequence body.ply run.pc2 --ccd       one line per step from a frame to the next
 
 FRAMES is a .pc2 or .mdd file, the first of numbered mesh files, or a pattern of their names.
-Without --other, the pairs within the body are found; with it, those between bodies, and with --self both. The last line
-says which.";
+Without --other and --moving, the pairs within the body are found; with them, those between bodies, and with --self
+both. The last line says which.";
 
 /// Options of the detector.
 #[derive(Debug, Clone, Args)]
@@ -506,7 +507,11 @@ pub struct SequenceArgs {
     /// A mesh that does not move: body 1, 2, …
     #[arg(long = "other", value_name = "MESH")]
     pub others: Vec<PathBuf>,
-    /// Also find the pairs within each body; implied without --other
+    /// Another mesh that moves, and as many frames of it, which belong to those above one by one:
+    /// a body after those of --other
+    #[arg(long, num_args = 2, value_names = ["MESH", "FRAMES"])]
+    pub moving: Vec<PathBuf>,
+    /// Also find the pairs within each body; implied without --other and --moving
     #[arg(long = "self")]
     pub within: bool,
     /// Frames from A up to, but not including, B, counted from 0; either may be omitted

@@ -34,7 +34,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let text = "--bodies: the frames of a sequence are those of one body, which is a file";
         return Err(Error::Usage(text.to_owned()));
     }
-    let is_alone = args.others.is_empty();
+    let is_alone = args.others.is_empty() && args.moving.is_empty();
     let asked = Asked {
         rest: args.rest.distance,
         ..asked((!is_alone, args.within || is_alone), &args.ask)
@@ -47,10 +47,18 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let (moving, weld) = bodies.add(&args.mesh, loading)?;
     let all = std::iter::once(&args.mesh).chain(&args.sequence);
     let all: Vec<PathBuf> = all.cloned().collect();
-    let (opened, name) = opened(&all)?;
-    let mut frames = Frames::of(opened, name, &args.mesh, weld, args.ask.json)?;
+    let (of_mesh, name) = opened(&all)?;
+    let mut frames = Frames::of(of_mesh, name, &args.mesh, weld, args.ask.json)?;
     for other in &args.others {
         bodies.add(other, loading)?;
+    }
+    let mut others = Vec::new();
+    for pair in args.moving.chunks(2) {
+        let (body, weld) = bodies.add(&pair[0], loading)?;
+        let (of_other, name) = opened(pair)?;
+        let other = Frames::of(of_other, name, &pair[0], weld, args.ask.json)?;
+        other.check_beside(&frames)?;
+        others.push((body, other));
     }
     let Bodies {
         mut scene,
@@ -90,7 +98,9 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let inputs = Inputs::new(
         std::iter::once(&args.mesh)
             .chain(&args.others)
-            .chain(frames.sequence.files()),
+            .chain(&args.moving)
+            .chain(frames.sequence.files())
+            .chain(others.iter().flat_map(|(_, other)| other.sequence.files())),
     );
     let file = args.rows.file(&inputs, args.ask.json)?;
     let prints = !args.ask.json && !file.as_ref().is_some_and(RowsFile::is_stdout);
@@ -112,7 +122,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let steps = steps_of_sequence(
             (&mut detector, &mut scene, moving, &origins),
             &query,
-            &mut frames,
+            (&mut frames, &others),
             range,
             shown,
             || watch.frame_done(),
@@ -143,6 +153,12 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let set = |positions: &impinge::Positions| scene.set_positions(moving, positions);
         if frames.take(frame_ix, set)?.is_none() {
             continue;
+        }
+        for (body, other) in &others {
+            let at = other.read(frame_ix)?;
+            scene
+                .set_positions(*body, &at)
+                .map_err(|source| other.refused(frame_ix, source))?;
         }
         let pairs = &detector.detect(&scene, &query)?;
         n_pairs += pairs.len();
@@ -345,6 +361,20 @@ impl Frames {
 }
 
 impl Frames {
+    /// Refuses frames that do not belong to those of another mesh one by one.
+    fn check_beside(&self, first: &Frames) -> Result<(), Error> {
+        let said = match [first, self].map(Frames::n_frames) {
+            [first, own] if first != own => format!("{own} frames given, {first} needed"),
+            _ => match [first, self].map(|of| of.after_gaps.is_empty()) {
+                [true, true] => return Ok(()),
+                _ => "frames are missing between others".to_owned(),
+            },
+        };
+        let name = printable(&self.name);
+        let why = "the frames of meshes that move belong together one by one";
+        Err(Error::Usage(format!("--moving: {name}: {said}: {why}")))
+    }
+
     pub(super) fn n_frames(&self) -> usize {
         self.sequence.n_frames()
     }

@@ -184,6 +184,63 @@ fn ranges_of_frames() {
     }
 }
 
+/// Two meshes that both move are answered as each pair of poses is, and on the way.
+#[test]
+fn two_meshes_that_move() {
+    let folder = Folder::new();
+    let frames = write(&folder, 6);
+    let rest = ball(200);
+    let others = Vec::from_iter((0..6).map(|frame| {
+        let up = frame as f32 / 3.0 - 1.0;
+        rest.mapped(|[x, y, z]| [x + 0.4, y, z + up])
+    }));
+    folder.ply("other.ply", &rest);
+    for (name, n) in [("other.pc2", 6), ("short.pc2", 5)] {
+        let path = folder.path(name);
+        let mut cache = Pc2Writer::create(&path, rest.n_vertices(), 0.0, 1.0).unwrap();
+        for other in &others[..n] {
+            cache.append(&other.positions).unwrap();
+        }
+        cache.finish().unwrap();
+    }
+    let base = ["sequence", "ball.ply", "run.pc2", "--moving", "other.ply"];
+    let both = Vec::from_iter(base.into_iter().chain(["other.pc2"]));
+    let found = lines(&folder.run(both.iter().chain(&["--json"])).printed());
+    assert_eq!(found.len(), 6);
+    let mut n_pairs = 0;
+    for (line, models) in found.iter().zip(frames.iter().zip(&others)) {
+        let (rows, hash) = oracle(&[models.0, models.1], |_| Query::between_all());
+        assert_eq!(
+            (&line["pairs"], &line["hash"]),
+            (&json!(rows.len()), &json!(hash))
+        );
+        n_pairs += rows.len();
+    }
+    assert!(n_pairs > 100, "{n_pairs}");
+    // As `impinge step` with the ends of both.
+    for (ix, end) in others.iter().enumerate() {
+        folder.ply(&format!("other_{ix:03}.ply"), end);
+    }
+    let steps = lines(&folder.run(both.iter().chain(&["--ccd", "--json"])).stdout);
+    assert_eq!(steps.len(), 5);
+    let mut n_impacts = 0;
+    for (ix, step) in steps.iter().enumerate() {
+        let ends = |name: &str| [0, 1].map(|k| format!("{name}_{:03}.ply", ix + k));
+        let files = [ends("run"), ends("other")].concat();
+        let more = ["--no-self", "--no-weld", "--json"].map(str::to_owned);
+        let all = ["step".to_owned()].into_iter().chain(files).chain(more);
+        let own: Value = serde_json::from_str(&folder.run(all).stdout).unwrap();
+        for key in ["impacts", "hash", "earliest", "start_intersects"] {
+            assert_eq!(step[key], own[key], "{ix} {key}");
+        }
+        n_impacts += own["impacts"].as_u64().unwrap();
+    }
+    assert!(n_impacts > 100, "{n_impacts}");
+    let said = folder.run(base.iter().chain(&["short.pc2"])).misuse();
+    let text = "--moving: short.pc2: 5 frames given, 6 needed: ";
+    assert!(said.contains(text), "{said}");
+}
+
 #[test]
 fn text_for_people() {
     let folder = Folder::new();

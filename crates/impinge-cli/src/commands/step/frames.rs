@@ -91,12 +91,12 @@ pub trait Frames {
     fn named(&self, frame_ix: usize) -> report::Frame;
 }
 
-/// Steps from each frame of a range to the next, the body `moving` in motion and all others at
-/// rest.
-pub fn steps_of_sequence(
+/// Steps from each frame of a range to the next: the body `moving` and `others` that have frames
+/// are in motion, all other bodies at rest.
+pub fn steps_of_sequence<F: Frames>(
     (detector, scene, moving, origins): (&mut Detector, &mut Scene, BodyId, &Origins),
     step: &Query,
-    frames: &mut impl Frames,
+    (frames, others): (&mut F, &[(BodyId, F)]),
     range: Range<usize>,
     mut shown: Shown,
     frame_done: impl Fn(),
@@ -123,6 +123,16 @@ pub fn steps_of_sequence(
         let Some(end) = end else {
             continue;
         };
+        let mut ends = vec![(moving, end)];
+        for (body, other) in others {
+            let end = other.read(end_ix)?;
+            let set = match is_first {
+                true => scene.set_positions(*body, &end),
+                false => scene.set_end_positions(*body, &end),
+            };
+            set.map_err(|source| other.refused(end_ix, source))?;
+            ends.push((*body, end));
+        }
         before = true;
         if is_first {
             continue;
@@ -170,7 +180,9 @@ pub fn steps_of_sequence(
         }
         out().flush()?;
         frame_done();
-        scene.set_positions(moving, &end)?;
+        for (body, end) in &ends {
+            scene.set_positions(*body, end)?;
+        }
     }
     if let Some(rows) = shown.rows {
         rows.finish()?;
