@@ -109,7 +109,8 @@ impl Detector {
         let any = self.distances.any(scene, plan, Work { workers, control })?;
         if any.is_some() {
             // One thread has found it, without the loop.
-            self.stats.begin(Method::Clusters.name(), "cpu", 1);
+            self.stats.clear();
+            self.stats.found_by(Method::Clusters.name(), "cpu", 1);
             self.stats.total_ms = plan.since.elapsed().as_secs_f64() * 1e3;
         }
         Ok(any)

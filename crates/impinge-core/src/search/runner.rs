@@ -153,8 +153,9 @@ impl Runner {
         find: impl FnOnce(&Workers, &mut Stats) -> Result<A, Error>,
     ) -> Result<A, Error> {
         let start = Instant::now();
+        stats.clear();
         // Trees of clusters serve all of these.
-        stats.begin(Method::Clusters.name(), "cpu", self.workers.n());
+        stats.found_by(Method::Clusters.name(), "cpu", self.workers.n());
         let answer = find(&self.workers, stats)?;
         self.workers.report(&mut stats.ways);
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -190,7 +191,7 @@ impl Runner {
         let answer = Answer::new(plan.limits, plan.held(), outcome.take_buffers());
         let answer = Arc::new(answer);
         let stats = outcome.stats_mut();
-        stats.begin(finder.method(), finder.backend(), workers.n());
+        stats.found_by(finder.method(), finder.backend(), workers.n());
         let job = Job {
             scene,
             plan,

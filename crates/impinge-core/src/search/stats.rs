@@ -98,7 +98,18 @@ impl Stats {
     /// All counts, each with the name of its field, in the order of the fields.
     pub fn counts(&self) -> impl Iterator<Item = (&'static str, u64)> {
         macro_rules! named {
-            ($($count:ident)*) => { [$((stringify!($count), self.$count as u64)),*] };
+            ($($count:ident)*) => {{
+                let Stats {
+                    backend: _,
+                    method: _,
+                    stages: _,
+                    total_ms: _,
+                    grid: _,
+                    ways: _,
+                    $($count),*
+                } = self;
+                [$((stringify!($count), *$count as u64)),*]
+            }};
         }
         let counts = named! {
             n_threads n_subdivided n_entries n_clusters n_culled n_work_items n_candidates n_unsure
@@ -107,10 +118,10 @@ impl Stats {
         counts.into_iter()
     }
 
-    /// Starts those of a frame. Keeps the allocated memory.
-    pub(crate) fn begin(&mut self, method: &'static str, backend: &str, n_threads: usize) {
-        self.clear();
+    /// Says how a question is answered, of statistics that are clear or hold what came before it.
+    pub(crate) fn found_by(&mut self, method: &'static str, backend: &str, n_threads: usize) {
         (self.method, self.n_threads) = (method, n_threads);
+        self.backend.clear();
         self.backend.push_str(backend);
     }
 

@@ -99,6 +99,13 @@ fn a_start_that_intersects_is_not_free_if_asked() {
         );
         let impacts = detector.impacts(&scene, &verify).expect("good");
         assert_eq!((impacts.len(), impacts.start_intersects()), (0, Some(true)));
+        // What the start took is said, also where the step is asked about after it.
+        let apart = verify.clone().exclude((plate, rod));
+        for query in [&verify, &apart] {
+            let impacts = detector.impacts(&scene, query).expect("good");
+            let stages = impacts.stats().stages.iter().map(|stage| stage.name);
+            assert_eq!(stages.filter(|&name| name == "start").count(), 1);
+        }
         assert_eq!(detector.earliest(&scene, &verify).expect("good"), None);
         assert_eq!(detector.start_intersects(), Some(true));
         assert_eq!(detector.earliest(&scene, &report).expect("good"), None);
