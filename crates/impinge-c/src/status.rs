@@ -126,13 +126,12 @@ fn watch() {
     });
 }
 
-/// Whether this thread may be one of the library's: those of detectors have names that begin so,
-/// and those of rayon's pool of the process have none.
+/// Whether this thread is one of the library's, whose names begin so.
 fn may_help() -> bool {
     let thread = std::thread::current();
     thread
         .name()
-        .is_none_or(|name| name.starts_with("impinge-"))
+        .is_some_and(|name| name.starts_with("impinge-"))
 }
 
 fn place_of_helper() -> impl DerefMut<Target = String> {
@@ -427,7 +426,8 @@ mod tests {
     #[test]
     fn a_panic_of_a_helper_has_its_place() {
         let help = || {
-            let helper = std::thread::spawn(|| panic!("on a helper"));
+            let named = std::thread::Builder::new().name("impinge-pool-0".to_owned());
+            let helper = named.spawn(|| panic!("on a helper")).expect("a thread");
             std::panic::resume_unwind(helper.join().expect_err("it panics"));
         };
         assert_eq!(guard(help), INTERNAL);

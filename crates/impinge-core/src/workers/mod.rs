@@ -408,7 +408,8 @@ pub(crate) fn n_at_hand() -> usize {
         SIZED.call_once(|| {
             let n = thread::available_parallelism().map_or(1, usize::from);
             let pool = rayon::ThreadPoolBuilder::new().num_threads(n);
-            // Without its threads rayon says so, as without this call.
+            let pool = pool.thread_name(|ix| format!("impinge-pool-{ix}"));
+            // Where threads cannot be had, rayon panics when the pool is first used.
             let _ = pool.build_global();
         });
     }
