@@ -316,7 +316,8 @@ pub struct AskArgs {
     /// End with exit code 3 if anything is found
     #[arg(long)]
     pub fail_on_hit: bool,
-    /// Also print the bodies, the time of each stage, counters and the hash of the answer
+    /// Also print the time of each stage, and where all pairs are found the bodies, counters and
+    /// the hash
     #[arg(short, long)]
     pub verbose: bool,
     /// Print JSON and nothing else (see docs/cli.md)

@@ -122,7 +122,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let steps = steps_of_sequence(
             (&mut detector, &mut scene, moving, &origins),
             &query,
-            (&mut frames, &others),
+            (&mut frames, &mut others),
             range,
             shown,
             || watch.frame_done(),
@@ -139,7 +139,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             let text = format!("{}\n{stages}{line}\n", steps.total());
             output::say(text.as_bytes(), file.as_ref())?;
         }
-        return frames.end(steps.end(args.ask.fail_on_hit));
+        return end(steps.end(args.ask.fail_on_hit), &frames, &others);
     }
     let mut outputs = Outputs::new(args, inputs, file.as_ref())?;
     outputs.check(range.start)?;
@@ -154,11 +154,13 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         if frames.take(frame_ix, set)?.is_none() {
             continue;
         }
-        for (body, other) in &others {
-            let at = other.read(frame_ix)?;
-            scene
-                .set_positions(*body, &at)
-                .map_err(|source| other.refused(frame_ix, source))?;
+        let mut are_set = true;
+        for (body, other) in &mut others {
+            let set = |at: &impinge::Positions| scene.set_positions(*body, at);
+            are_set &= other.take(frame_ix, set)?.is_some();
+        }
+        if !are_set {
+            continue;
         }
         let pairs = &detector.detect(&scene, &query)?;
         n_pairs += pairs.len();
@@ -191,7 +193,18 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let text = format!("{}{stages}{line}\n", lines.total());
         output::say(text.as_bytes(), file.as_ref())?;
     }
-    frames.end(hit(args.ask.fail_on_hit, n_pairs > 0))
+    let asked = hit(args.ask.fail_on_hit, n_pairs > 0);
+    end(asked, &frames, &others)
+}
+
+/// What the program ends with, frames of other meshes included.
+fn end(
+    asked: Result<(), Error>,
+    frames: &Frames,
+    others: &[(BodyId, Frames)],
+) -> Result<(), Error> {
+    let others = others.iter().map(|(_, other)| other);
+    others.fold(frames.end(asked), |asked, other| other.end(asked))
 }
 
 /// With `-v`, the median time of each stage.

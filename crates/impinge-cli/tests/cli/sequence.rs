@@ -236,6 +236,19 @@ fn two_meshes_that_move() {
         n_impacts += own["impacts"].as_u64().unwrap();
     }
     assert!(n_impacts > 100, "{n_impacts}");
+    // A frame that cannot be asked about is passed over, whichever mesh it is of.
+    let mut cache = std::fs::read(folder.path("other.pc2")).unwrap();
+    let third = 32 + 2 * 12 * rest.n_vertices();
+    cache[third..third + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+    std::fs::write(folder.path("holed.pc2"), cache).unwrap();
+    let holed = Vec::from_iter(base.into_iter().chain(["holed.pc2"]));
+    for (more, n, code) in [(&[][..], 5, 1), (&["--ccd"], 3, 4)] {
+        let run = folder.run(holed.iter().chain(more).chain(&["--json"]));
+        let asked = lines(&run.stdout);
+        let asked = asked.iter().filter(|line| line.get("error").is_none());
+        assert_eq!((asked.count(), run.code), (n, Some(code)), "{}", run.stderr);
+        assert!(run.stdout.contains("not finite") || run.stdout.contains("non-finite"));
+    }
     let said = folder.run(base.iter().chain(&["short.pc2"])).misuse();
     let text = "--moving: short.pc2: 5 frames given, 6 needed: ";
     assert!(said.contains(text), "{said}");

@@ -263,7 +263,7 @@ fn ways(bodies: &Moving) -> String {
     };
     let mut ways: Vec<String> = names.map(way).collect();
     if let Some(n @ 1..) = bodies.names.len().checked_sub(MOST_WAYS) {
-        ways.push(format!("{n} more"));
+        ways.push(format!("{n} more bodies"));
     }
     ways.join(", ")
 }

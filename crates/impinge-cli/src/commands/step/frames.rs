@@ -96,7 +96,7 @@ pub trait Frames {
 pub fn steps_of_sequence<F: Frames>(
     (detector, scene, moving, origins): (&mut Detector, &mut Scene, BodyId, &Origins),
     step: &Query,
-    (frames, others): (&mut F, &[(BodyId, F)]),
+    (frames, others): (&mut F, &mut [(BodyId, F)]),
     range: Range<usize>,
     mut shown: Shown,
     frame_done: impl Fn(),
@@ -124,14 +124,15 @@ pub fn steps_of_sequence<F: Frames>(
             continue;
         };
         let mut ends = vec![(moving, end)];
-        for (body, other) in others {
-            let end = other.read(end_ix)?;
-            let set = match is_first {
-                true => scene.set_positions(*body, &end),
-                false => scene.set_end_positions(*body, &end),
-            };
-            set.map_err(|source| other.refused(end_ix, source))?;
-            ends.push((*body, end));
+        for (body, other) in others.iter_mut() {
+            let end = other.take(end_ix, |end| match is_first {
+                true => scene.set_positions(*body, end),
+                false => scene.set_end_positions(*body, end),
+            })?;
+            ends.extend(end.map(|end| (*body, end)));
+        }
+        if ends.len() <= others.len() {
+            continue;
         }
         before = true;
         if is_first {
