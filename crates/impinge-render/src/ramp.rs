@@ -26,9 +26,10 @@ impl Least {
         bodies: impl IntoIterator<Item = BodyId>,
         pairs: impl IntoIterator<Item = (PairKind, [Element; 2], f64)>,
     ) -> Result<Self, Error> {
-        let numbers: HashMap<BodyId, usize> = bodies.into_iter().zip(0..).collect();
+        let bodies = Vec::from_iter(bodies);
         let mut all = Vec::new();
-        all.resize_with(numbers.len(), OfBody::default);
+        all.resize_with(bodies.len(), OfBody::default);
+        let numbers: HashMap<BodyId, usize> = bodies.into_iter().zip(0..).collect();
         for (kind, elements, number) in pairs {
             for (part, element) in kind.parts().into_iter().zip(elements) {
                 if let Some(&ix) = numbers.get(&element.body) {
@@ -40,9 +41,16 @@ impl Least {
     }
 
     /// The least number of an element and of its faces, edges and vertices, by the place of its
-    /// body and by its corners. `None` if they are in no pair.
+    /// body and by its corners. `None` if they are in no pair, or there is no such body.
     pub fn of(&self, body: usize, corners: &[u32]) -> Option<f64> {
-        self.0[body].of(corners)
+        self.0.get(body)?.of(corners)
+    }
+
+    /// Whether any element of a body has a number.
+    pub fn has(&self, body: usize) -> bool {
+        let any =
+            |of: &OfBody| !(of.vertices.is_empty() && of.edges.is_empty() && of.faces.is_empty());
+        self.0.get(body).is_some_and(any)
     }
 }
 

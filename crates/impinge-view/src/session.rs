@@ -649,6 +649,9 @@ impl Session {
             let body = scene.body(shown.id).map_err(|error| error.to_string())?;
             let time = |element: u32| times.of(ix, body.elements().corners(element as usize));
             marks[ix].clear();
+            if !times.has(ix) {
+                continue;
+            }
             for element in (0..).take(body.n_elements()) {
                 if let Some(toi) = time(element) {
                     marks[ix].push(element);

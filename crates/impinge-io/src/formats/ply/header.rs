@@ -291,6 +291,7 @@ impl Element {
 /// Where binary PLY, little-endian, with vertices, then triangles, and nothing else has its data:
 /// all vertices have the same number of bytes, and so have all triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PlyLayout {
     /// The offset of the first vertex in the file.
     pub start: u64,
@@ -320,6 +321,12 @@ impl PlyLayout {
         let name = Name("");
         let mut text = Text::new(name, head);
         let header = Header::read(name, &mut text).ok()?;
+        let start = text.offset();
+        // Where the bytes end in its last line, that may go on in the file.
+        let is_whole = match head[..start].last() {
+            Some(b'\r') => start < head.len(),
+            last => last == Some(&b'\n'),
+        };
         let [vertices, faces] = header.elements.as_slice() else {
             return None;
         };
@@ -330,7 +337,8 @@ impl PlyLayout {
         };
         let xyz = vertices.xyz(name).ok()?;
         let [x, y, z] = xyz.map(|(_, scalar)| scalar);
-        let is_known = header.storage == Storage::Binary(Endian::Little)
+        let is_known = is_whole
+            && header.storage == Storage::Binary(Endian::Little)
             && vertices.kind == Kind::Vertices
             && faces.kind == Kind::Faces
             && x == y
@@ -340,7 +348,7 @@ impl PlyLayout {
             && matches!(item, Scalar::I32 | Scalar::U32);
         let corners = size_of_scalars(before)?;
         is_known.then_some(PlyLayout {
-            start: text.offset() as u64,
+            start: start as u64,
             n_vertices: vertices.count,
             vertex_stride: vertices.stride()?,
             xyz: xyz.map(|(offset, _)| offset),
@@ -375,6 +383,10 @@ mod tests {
             is_signed: true,
         };
         assert_eq!(read(text), Some(expected));
+        assert_eq!(read(text.trim_end()), None);
+        let returns = text.replace('\n', "\r\n") + "x";
+        assert_eq!(read(&returns).unwrap().start, returns.len() as u64 - 1);
+        assert_eq!(read(returns.trim_end_matches(['\n', 'x'])), None);
         assert!(read(&text.replace("float", "double")).unwrap().is_f64);
         let unsigned = text.replace("int vertex", "uint vertex");
         assert!(!read(&unsigned).unwrap().is_signed);
