@@ -52,7 +52,7 @@ impl StepDecider {
         self.question = plan.question;
         self.n_candidates = 0;
         self.listing.begin();
-        // Unsure contacts are decided at the end of every question.
+        // `unsure::decide` ends every question, and those that have no contacts too.
         self.contacts.forget();
         match self.question {
             Question::Contact => self.contacts.begin(n_clusters, plan, tuning),
