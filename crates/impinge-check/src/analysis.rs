@@ -13,6 +13,7 @@ use crate::facets::{Facet, facets, groups, is_simplex};
 use crate::marks::{Marks, Problem};
 use crate::places::{Place, places};
 use crate::row::Counts;
+use crate::shells::{self, Shell};
 use crate::surface::{at, held};
 use crate::union_find::UnionFind;
 use crate::volume;
@@ -132,7 +133,12 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
     match &mesh.elements {
         Elements::Triangles(triangles) => {
             counts.n_triangles = triangles.len() as u64;
-            fans = topology(triangles, mesh.n_vertices(), &mut counts, &mut marks)?;
+            let found = topology(triangles, mesh.n_vertices(), &mut counts, &mut marks)?;
+            fans = found.fans;
+            let (mut pieces, is_closed) = (found.pieces, found.is_closed);
+            let mut shells = shells::closed(&mesh.positions, triangles, &mut pieces, is_closed);
+            shells::nest(&mesh.positions, triangles, &mut shells, options.threads)?;
+            inside_out(&shells, &mut counts, &mut marks);
             if counts.is_watertight == Some(true) && counts.inconsistent_facets == 0 {
                 let points = |corners: &[u32; 3]| corners.map(|vertex| at(&mesh.positions, vertex));
                 let volume = volume::rounded(triangles.iter().map(points));
@@ -161,7 +167,7 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
         }
         Elements::Tetrahedra(tets) => {
             counts.n_tetrahedra = tets.len() as u64;
-            fans = topology(tets, mesh.n_vertices(), &mut counts, &mut marks)?;
+            fans = topology(tets, mesh.n_vertices(), &mut counts, &mut marks)?.fans;
             degenerate(
                 &mesh.positions,
                 tets,
@@ -272,14 +278,32 @@ fn intersections(
     Ok((found, copies))
 }
 
-/// Counts and marks everything that depends on vertex indices alone. Returns the vertices of
-/// several fans, ascending.
+/// Counts and marks shells that are inside out.
+fn inside_out(shells: &[Shell], counts: &mut Counts, marks: &mut [Marks]) {
+    let turned = shells.iter().filter(|shell| shell.is_inside_out());
+    counts.inside_out = Some(turned.clone().count() as u64);
+    for &face in turned.flat_map(|shell| &shell.faces) {
+        marks[face as usize].add(Problem::InsideOut);
+    }
+}
+
+/// How elements hang together.
+struct Topology {
+    /// The vertices of several fans, ascending.
+    fans: Vec<u32>,
+    /// Elements connected through facets.
+    pieces: UnionFind,
+    /// Whether an element has a neighbour of its orientation at each facet.
+    is_closed: Vec<bool>,
+}
+
+/// Counts and marks everything that depends on vertex indices alone.
 fn topology<const K: usize>(
     elements: &[[u32; K]],
     n_vertices: usize,
     counts: &mut Counts,
     marks: &mut [Marks],
-) -> Result<Vec<u32>, Error> {
+) -> Result<Topology, Error> {
     let n_corners = u32::try_from(elements.len() * K).map_err(|_| Error::TooMany {
         what: "corners of elements",
         given: (elements.len() * K) as u64,
@@ -289,6 +313,7 @@ fn topology<const K: usize>(
     let mut pieces = UnionFind::new(n_corners / K as u32);
     let mut borders = UnionFind::new(n_vertices as u32);
     let mut on_border = vec![false; n_vertices];
+    let mut is_closed: Vec<bool> = elements.iter().map(is_simplex).collect();
     let sorted = facets(elements, n_vertices);
     let mut n_facets = 0i64;
     for group in groups(&sorted) {
@@ -312,10 +337,12 @@ fn topology<const K: usize>(
                 Some(Problem::NonManifold)
             }
         };
+        let closes = matches!(group, [a, b] if a.is_even != b.is_even);
         for facet in group {
             if let Some(problem) = problem {
                 marks[facet.element as usize].add(problem);
             }
+            is_closed[facet.element as usize] &= closes;
             join_neighbours(elements, &group[0], facet, &mut corners, &mut pieces);
         }
     }
@@ -331,7 +358,11 @@ fn topology<const K: usize>(
         let has_pairs = counts.boundary_facets + counts.non_manifold_facets == 0;
         counts.is_watertight = Some(has_pairs && n_faces > 0);
     }
-    Ok(fans)
+    Ok(Topology {
+        fans,
+        pieces,
+        is_closed,
+    })
 }
 
 /// Two elements with a common facet belong to one piece, and to one fan around each vertex of the

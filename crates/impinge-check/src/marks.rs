@@ -18,6 +18,9 @@ pub enum Problem {
     /// Has an edge (a tetrahedron: a face) whose other element has the opposite orientation.
     #[serde(rename = "orientation")]
     Inconsistent,
+    /// Is of a closed piece whose faces point inward, or, around a cavity, outward: those that
+    /// [`Repair::Outward`](crate::Repair::Outward) turns.
+    InsideOut,
     /// Has zero area (a tetrahedron: zero volume).
     Degenerate,
     /// Has an edge of no other triangle. Not used for tetrahedra, which always have a border.
@@ -28,11 +31,12 @@ pub enum Problem {
 
 impl Problem {
     /// All problems, the most serious first.
-    pub const ALL: [Problem; 7] = [
+    pub const ALL: [Problem; 8] = [
         Problem::SelfIntersection,
         Problem::Duplicate,
         Problem::NonManifold,
         Problem::Inconsistent,
+        Problem::InsideOut,
         Problem::Degenerate,
         Problem::Boundary,
         Problem::Thin,
@@ -49,6 +53,7 @@ impl Problem {
             Problem::Duplicate => [255, 127, 14],
             Problem::NonManifold => [148, 103, 189],
             Problem::Inconsistent => [188, 189, 34],
+            Problem::InsideOut => [140, 86, 75],
             Problem::Degenerate => [227, 119, 194],
             Problem::Boundary => [27, 95, 217],
             Problem::Thin => [23, 190, 207],
@@ -62,6 +67,7 @@ impl Problem {
             Problem::Duplicate => "orange",
             Problem::NonManifold => "purple",
             Problem::Inconsistent => "olive",
+            Problem::InsideOut => "brown",
             Problem::Degenerate => "pink",
             Problem::Boundary => "blue",
             Problem::Thin => "cyan",
@@ -75,6 +81,7 @@ impl Problem {
             Problem::Duplicate => "duplicates",
             Problem::NonManifold => "non-manifold",
             Problem::Inconsistent => "orientation",
+            Problem::InsideOut => "inside-out",
             Problem::Degenerate => "degenerate",
             Problem::Boundary => "boundary",
             Problem::Thin => "thin",
@@ -88,6 +95,7 @@ impl Problem {
             Problem::Duplicate => "duplicate",
             Problem::NonManifold => "non-manifold",
             Problem::Inconsistent => "inconsistent orientation",
+            Problem::InsideOut => "inside out",
             Problem::Degenerate => "degenerate",
             Problem::Boundary => "open border",
             Problem::Thin => "thin wall",

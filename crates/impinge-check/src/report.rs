@@ -28,6 +28,9 @@ pub const COLUMNS: [(&str, Option<Finding>); 8] = [
     ("pieces", None),
 ];
 
+/// A further column: its name, and the cell of a mesh.
+type Column = (&'static str, fn(&Counts) -> String);
+
 /// The numbers of a mesh under [`COLUMNS`].
 pub fn numbers(counts: &Counts) -> [u64; 8] {
     [
@@ -95,20 +98,19 @@ impl Report<'_> {
     pub fn text(&self) -> String {
         let few = self.rows.len() <= LISTED;
         let listed: Vec<&Row> = self.rows.iter().filter(|row| few || has_any(row)).collect();
-        let asks = |row: &Row| matches!(&row.result, Ok(counts) if counts.min_thickness.is_some());
-        let asks_walls = self.rows.iter().any(asks);
+        let more = self.more_columns();
         let lines = listed.iter().take(LISTED).filter_map(|row| {
             let counts = row.result.as_ref().ok()?;
             let name = [printable(&row.path)].into_iter();
             let cells = name.chain(numbers(counts).map(grouped));
-            let thin = asks_walls.then(|| counts.thin_faces.map_or("-".to_owned(), grouped));
-            Some(cells.chain(thin).collect::<Vec<_>>())
+            let more = more.iter().map(|&(_, of)| of(counts));
+            Some(cells.chain(more).collect::<Vec<_>>())
         });
         let lines: Vec<_> = lines.collect();
         let mut text = String::new();
         if !lines.is_empty() {
             let names = ["mesh"].into_iter().chain(COLUMNS.map(|(name, _)| name));
-            let names = names.chain(asks_walls.then_some("thin"));
+            let names = names.chain(more.iter().map(|&(name, _)| name));
             text += &aligned(names.map(str::to_owned).collect(), lines);
             text.push('\n');
         }
@@ -130,6 +132,23 @@ impl Report<'_> {
         text += &self.summary();
         text.push('\n');
         text
+    }
+
+    /// The columns that only some tables have: pieces that are inside out, if there are any, and
+    /// thin walls, if they were asked for.
+    fn more_columns(&self) -> Vec<Column> {
+        fn cell(n: Option<u64>) -> String {
+            n.map_or("-".to_owned(), grouped)
+        }
+        let mut columns: Vec<Column> = Vec::new();
+        if self.rows.iter().any(|row| Finding::InsideOut.is_in(row)) {
+            columns.push(("inside out", |counts| cell(counts.inside_out)));
+        }
+        let asks = |row: &Row| matches!(&row.result, Ok(counts) if counts.min_thickness.is_some());
+        if self.rows.iter().any(asks) {
+            columns.push(("thin", |counts| cell(counts.thin_faces)));
+        }
+        columns
     }
 
     /// How many meshes have what, in one line.
@@ -200,20 +219,25 @@ impl Report<'_> {
             let text = text.replace('\\', "\\\\").replace('|', "\\|");
             text.replace('<', "&lt;").replace('`', "\\`")
         };
+        let more = self.more_columns();
         let counted: Vec<(&Row, &Counts)> = bad
             .iter()
             .filter_map(|row| Some((*row, row.result.as_ref().ok()?)))
             .take(LISTED)
             .collect();
         if !counted.is_empty() {
-            let names = COLUMNS.map(|(name, _)| name).join(" | ");
+            let names = COLUMNS.map(|(name, _)| name).into_iter();
+            let names: Vec<&str> = names.chain(more.iter().map(|&(name, _)| name)).collect();
             let _ = writeln!(
                 text,
-                "| mesh | {names} |\n|---|{}",
-                "---:|".repeat(COLUMNS.len())
+                "| mesh | {} |\n|---|{}",
+                names.join(" | "),
+                "---:|".repeat(names.len())
             );
             for (row, counts) in counted {
-                let numbers = numbers(counts).map(grouped).join(" | ");
+                let numbers = numbers(counts).map(grouped).into_iter();
+                let numbers = numbers.chain(more.iter().map(|&(_, of)| of(counts)));
+                let numbers = numbers.collect::<Vec<_>>().join(" | ");
                 let _ = writeln!(text, "| {} | {numbers} |", cell(&printable(&row.path)));
             }
             text.push('\n');

@@ -50,6 +50,10 @@ pub struct Counts {
     /// Facets of two elements with opposite orientations.
     #[serde(rename = "inconsistent_edges")]
     pub inconsistent_facets: u64,
+    /// Closed pieces of one orientation whose faces point inward, or, around a cavity, outward:
+    /// those that [`Repair::Outward`](crate::Repair::Outward) turns. `None` for tetrahedra.
+    #[serde(rename = "inside_out_pieces")]
+    pub inside_out: Option<u64>,
     /// Pieces connected through facets. Elements that name a vertex twice belong to none.
     pub components: u64,
     /// Vertices of no element, counted after welding.
@@ -281,6 +285,7 @@ mod tests {
                 boundary_facets: 12,
                 boundaries: 13,
                 inconsistent_facets: 14,
+                inside_out: (n_tetrahedra == 0).then_some(18),
                 components: 15,
                 unused_vertices: 16,
                 is_watertight: (n_tetrahedra == 0).then_some(true),
@@ -303,7 +308,7 @@ mod tests {
         }
     }
 
-    /// The bytes that rows of earlier versions have: what was stored is read, and compares.
+    /// The bytes that rows have: what was stored is read, and compares.
     #[test]
     fn rows_keep_their_bytes() {
         let failed = Row::failed("x", false, ErrorKind::NotFinite, "no number");
@@ -331,5 +336,13 @@ mod tests {
             assert_eq!(Row::from_json(&value), Some(row));
         }
         assert_eq!(Row::from_json(&json!({"path": "x", "error": null})), None);
+        // Rows of earlier versions do not count pieces that are inside out.
+        let mut earlier = counted(4, 0).to_json();
+        earlier
+            .as_object_mut()
+            .unwrap()
+            .shift_remove("inside_out_pieces");
+        let counts = Row::from_json(&earlier).unwrap().result.unwrap();
+        assert_eq!(counts.inside_out, None);
     }
 }

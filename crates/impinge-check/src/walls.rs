@@ -20,7 +20,8 @@ use impinge_io::Positions;
 use crate::by_vertex::ByVertex;
 use crate::marks::{Marks, Problem};
 use crate::row::Counts;
-use crate::surface::{Surface, held, shells};
+use crate::shells::shells;
+use crate::surface::{Surface, held};
 
 /// The cosine of 45°.
 const ALONG: f64 = std::f64::consts::FRAC_1_SQRT_2;

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use impinge::{Backend, Detector, Method, Query, Scene, Settings, SharedVertex};
-use impinge_check::{Counts, ErrorKind, Options, Problem, check_file, check_mesh};
+use impinge_check::{
+    Counts, ErrorKind, FixOptions, Options, Problem, check_file, check_mesh, fix_mesh,
+};
 use impinge_io::{Elements, Mesh, Positions};
 use impinge_scenes::Random;
 use impinge_testing::data::test_file;
@@ -39,6 +41,7 @@ fn a_closed_surface_has_nothing() {
         n_vertices: 4,
         n_triangles: 4,
         hash: Some(0),
+        inside_out: Some(0),
         components: 1,
         is_watertight: Some(true),
         volume: Some(1.0 / 6.0),
@@ -540,4 +543,62 @@ fn places_are_where_the_problems_are() {
             .unwrap();
         assert_eq!((border.n_elements, border.elements.len()), (30, n));
     }
+}
+
+/// Tetrahedra: where each begins, the length of its edges, and whether its faces point outward.
+fn tetrahedra(of: &[(f64, f64, bool)]) -> Mesh {
+    let (mut positions, mut faces) = (Vec::new(), Vec::new());
+    for &(at, size, is_outward) in of {
+        let (corners, held) = tetrahedron(0.0);
+        let first = positions.len() as u32;
+        positions.extend(corners.iter().map(|p| p.map(|x| at + size * x)));
+        faces.extend(held.iter().map(|&[a, b, c]| match is_outward {
+            true => [first + a, first + b, first + c],
+            false => [first + a, first + c, first + b],
+        }));
+    }
+    triangles(positions, faces)
+}
+
+#[test]
+fn each_closed_piece_may_be_inside_out() {
+    let (outer, far, hollow, core) = ((0.0, 9.0), (20.0, 1.0), (1.0, 2.0), (1.125, 0.5));
+    let with = |(at, size): (f64, f64), is_outward| (at, size, is_outward);
+    for (of, turned) in [
+        (&[with(outer, true), with(far, true)][..], &[][..]),
+        (&[with(outer, true), with(far, false)], &[1]),
+        (&[with(outer, false), with(far, false)], &[0, 1]),
+        // A hole, which the faces around it bound; and matter in the hole.
+        (&[with(outer, true), with(hollow, false)], &[]),
+        (&[with(hollow, true), with(outer, true)], &[0]),
+        (
+            &[with(core, true), with(outer, true), with(hollow, false)],
+            &[],
+        ),
+        (
+            &[with(core, false), with(outer, false), with(hollow, false)],
+            &[0, 1],
+        ),
+    ] {
+        let checked = check_mesh(tetrahedra(of), &Options::default()).unwrap();
+        assert_eq!(checked.counts.inside_out, Some(turned.len() as u64));
+        for (face, marks) in checked.marks.iter().enumerate() {
+            let is_turned = turned.contains(&(face / 4));
+            assert_eq!(marks.has(Problem::InsideOut), is_turned, "{of:?} {face}");
+        }
+        let places = checked.places.iter();
+        let places = places.filter(|place| place.problem == Problem::InsideOut);
+        let named: Vec<&[u32]> = places.map(|place| &place.elements[..]).collect();
+        assert_eq!(named.len(), turned.len());
+        // Mending finds the same, and leaves none.
+        let fixed = fix_mesh(tetrahedra(of), &FixOptions::default()).unwrap();
+        assert_eq!(fixed.repairs.turned_shells, turned.len() as u64);
+        assert_eq!(fixed.after.inside_out, Some(0));
+    }
+    // Nothing is closed.
+    let mut mesh = tetrahedra(&[with(outer, false)]);
+    if let Elements::Triangles(faces) = &mut mesh.elements {
+        faces.pop();
+    }
+    assert_eq!(counts(mesh).inside_out, Some(0));
 }

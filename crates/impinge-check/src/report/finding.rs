@@ -21,7 +21,7 @@ pub enum Finding {
     NonManifold,
     /// Neighbours with opposite orientations.
     Orientation,
-    /// A closed surface that encloses a negative volume: its faces are inside out.
+    /// Closed pieces whose faces point inward, or, around a cavity, outward.
     InsideOut,
     /// Edges of only one triangle.
     Boundary,
@@ -48,11 +48,10 @@ impl Finding {
         Finding::Error,
     ];
 
-    /// The name: that of the [problem](Problem::key), `inside-out`, `nan` or `error`.
+    /// The name: that of the [problem](Problem::key), `nan` or `error`.
     pub fn name(self) -> &'static str {
         match (self.problem(), self) {
             (Some(problem), _) => problem.key(),
-            (None, Finding::InsideOut) => "inside-out",
             (None, Finding::Nan) => "nan",
             (None, _) => "error",
         }
@@ -82,9 +81,10 @@ impl Finding {
             Finding::Duplicates => Some(Problem::Duplicate),
             Finding::NonManifold => Some(Problem::NonManifold),
             Finding::Orientation => Some(Problem::Inconsistent),
+            Finding::InsideOut => Some(Problem::InsideOut),
             Finding::Boundary => Some(Problem::Boundary),
             Finding::Thin => Some(Problem::Thin),
-            Finding::InsideOut | Finding::Nan | Finding::Error => None,
+            Finding::Nan | Finding::Error => None,
         }
     }
 
@@ -97,14 +97,19 @@ impl Finding {
         }
     }
 
-    fn count(self, counts: &Counts) -> u64 {
+    /// How many of them a mesh has.
+    pub fn count(self, counts: &Counts) -> u64 {
         match self {
             Finding::SelfIntersections => counts.self_intersections,
             Finding::Degenerate => counts.degenerate,
             Finding::Duplicates => counts.duplicates,
             Finding::NonManifold => counts.non_manifold_facets + counts.non_manifold_vertices,
             Finding::Orientation => counts.inconsistent_facets,
-            Finding::InsideOut => counts.volume.is_some_and(|volume| volume < 0.0).into(),
+            // Rows of earlier versions have the volume alone.
+            Finding::InsideOut => {
+                let is_negative = counts.volume.is_some_and(|volume| volume < 0.0);
+                counts.inside_out.unwrap_or(is_negative.into())
+            }
             // Meshes of tetrahedra always have a border.
             Finding::Boundary if counts.n_tetrahedra > 0 => 0,
             Finding::Boundary => counts.boundary_facets,
@@ -154,7 +159,9 @@ impl Finding {
                 let facets = several(n, facet, facets);
                 format!("inconsistent orientation at {facets}")
             }
-            Finding::InsideOut => "the faces are inside out".to_owned(),
+            Finding::InsideOut => {
+                several(n, "closed surface inside out", "closed surfaces inside out")
+            }
             Finding::Thin => several(n, "face at a thin wall", "faces at thin walls"),
             Finding::Nan | Finding::Error => self.words().to_owned(),
         }

@@ -25,7 +25,7 @@ const fn number(name: &'static str) -> Column {
 impl Row {
     /// The columns of a table of meshes: the keys of all objects made by
     /// [`to_json`](Self::to_json) but `places`. What is `null` there is nothing here.
-    pub const COLUMNS: [Column; 30] = [
+    pub const COLUMNS: [Column; 31] = [
         text("path"),
         flag("welded"),
         count("vertices"),
@@ -42,6 +42,7 @@ impl Row {
         count("boundary_edges"),
         count("boundaries"),
         count("inconsistent_edges"),
+        count("inside_out_pieces"),
         count("components"),
         count("unused_vertices"),
         flag("watertight"),
@@ -59,7 +60,7 @@ impl Row {
     ];
 
     /// The cells of an object made by [`to_json`](Self::to_json), under [`COLUMNS`](Self::COLUMNS).
-    pub fn cells(object: &Value) -> [Cell<'_>; 30] {
+    pub fn cells(object: &Value) -> [Cell<'_>; 31] {
         Row::COLUMNS.map(|column| match &object[column.name] {
             Value::Bool(is_so) => Cell::Bool(*is_so),
             Value::Number(n) if column.holds == Holds::Count => {
@@ -107,6 +108,7 @@ mod tests {
                 hash: Some(1),
                 is_watertight: Some(true),
                 volume: Some(0.5),
+                inside_out: Some(3),
                 euler: Some(-2),
                 ..Counts::default()
             }),

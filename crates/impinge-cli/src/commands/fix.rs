@@ -5,7 +5,9 @@ mod args;
 use std::io::Write;
 use std::path::Path;
 
-use impinge_check::{Counts, FixError, FixOptions, Fixed, Place, Repair, Report, Row, fix_mesh};
+use impinge_check::{
+    Counts, Finding, FixError, FixOptions, Fixed, Place, Repair, Report, Row, fix_mesh,
+};
 use impinge_io::{
     Cell, ELEMENTS, Elements, Mesh, ReadOptions, Summary, printable, read_bytes_with_summary,
     read_with_summary, write_obj, write_plain_ply, write_stl,
@@ -206,9 +208,9 @@ fn text(args: &FixArgs, options: &FixOptions, fixed: &Fixed, summary: &Summary) 
             "shells without volume",
         ),
         (
-            u64::from(after.volume.is_some_and(|volume| volume < 0.0)),
+            Finding::InsideOut.count(after),
             "closed surface inside out",
-            "",
+            "closed surfaces inside out",
         ),
         (
             after.unused_vertices,

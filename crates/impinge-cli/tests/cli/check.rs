@@ -1062,6 +1062,50 @@ fn a_closed_mesh_that_is_inside_out_is_not_clean() {
     assert_eq!(folder.run(check).code, Some(0));
 }
 
+/// One closed piece that points outward, and apart from it a smaller one that points inward.
+const MIXED: &str = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nv 20 0 0\nv 21 0 0\nv 20 1 0\nv 20 0 1\n\
+    f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\nf 5 6 7\nf 5 8 6\nf 5 7 8\nf 6 8 7\n";
+
+#[test]
+fn one_of_several_closed_pieces_that_is_inside_out_is_found() {
+    let folder = Folder::new();
+    folder.text("mixed.obj", MIXED);
+    for named in ["inside-out", "any"] {
+        let run = folder.run(["check", "mixed.obj", "--fail-on", named]);
+        assert_eq!(run.code, Some(3), "{}", run.stderr);
+        assert!(run.stderr.contains("1 with faces inside out"));
+        let table: Vec<&str> = run.stdout.lines().collect();
+        assert!(table[0].ends_with("pieces  inside out"), "{}", run.stdout);
+        assert!(table[1].ends_with("     2           1"), "{}", run.stdout);
+        let next = "next: impinge fix mixed.obj --out mixed-mended.ply";
+        assert_eq!(table.last(), Some(&next));
+    }
+    let rows = rows(folder.run(["check", "mixed.obj", "--json"]));
+    assert_eq!(
+        wrong(&schema("check"), &rows[0], "row"),
+        Vec::<String>::new()
+    );
+    assert_eq!(rows[0]["inside_out_pieces"], 1);
+    let places = rows[0]["places"].as_array().unwrap();
+    assert_eq!(places.len(), 1);
+    assert_eq!(places[0]["problem"], "inside-out");
+    assert_eq!(places[0]["elements"], serde_json::json!([4, 5, 6, 7]));
+    let junit = folder.run(["check", "mixed.obj", "--format", "junit"]);
+    let failure = "<failure type=\"inside-out\" message=\"1 closed surface inside out, near (20.";
+    assert!(junit.printed().contains(failure));
+    let kept = ["--skip", "outward", "--fail-on", "inside-out"];
+    let kept = [&["fix", "mixed.obj", "--out", "kept.ply"], &kept[..]].concat();
+    let run = folder.run(kept);
+    assert_eq!(run.code, Some(3));
+    let left = "\nleft: 1 closed surface inside out\n";
+    assert!(run.stdout.contains(left), "{}", run.stdout);
+    folder
+        .run(["fix", "mixed.obj", "--out", "mended.ply"])
+        .printed();
+    let check = ["check", "mended.ply", "--fail-on", "any"];
+    assert_eq!(folder.run(check).code, Some(0));
+}
+
 #[test]
 fn meshes_on_standard_input_are_refused_by_that_name() {
     let folder = Folder::new();

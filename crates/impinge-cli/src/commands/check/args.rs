@@ -324,7 +324,9 @@ impl FailOn {
                 "Edges of more than two triangles, vertices of several fans"
             }
             FailOn::Mesh(Finding::Orientation) => "Neighbours with opposite orientations",
-            FailOn::Mesh(Finding::InsideOut) => "Closed surfaces whose faces point inward",
+            FailOn::Mesh(Finding::InsideOut) => {
+                "Closed pieces whose faces point inward, or, around a cavity, outward"
+            }
             FailOn::Mesh(Finding::Boundary) => "Edges of only one triangle",
             FailOn::Mesh(Finding::Thin) => "Walls that --min-thickness finds",
             FailOn::Mesh(Finding::Nan) => "Coordinates that are NaN or infinite",

@@ -13,18 +13,16 @@ use crate::output::out;
 /// Prints the command that helps most: one that mends, or, where nothing can be mended, one that
 /// shows.
 pub fn print_next(rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
-    const MENDED: [Finding; 4] = [
+    const MENDED: [Finding; 5] = [
         Finding::Degenerate,
         Finding::Duplicates,
         Finding::NonManifold,
         Finding::Orientation,
+        Finding::InsideOut,
     ];
     let is_mendable = |row: &&Row| {
         row.result.as_ref().is_ok_and(|counts| {
-            let is_inside_out =
-                counts.volume.is_some_and(|volume| volume < 0.0) && counts.components == 1;
-            let is_found = MENDED.iter().any(|finding| finding.is_in(row));
-            counts.n_tetrahedra == 0 && (is_found || is_inside_out)
+            counts.n_tetrahedra == 0 && MENDED.iter().any(|finding| finding.is_in(row))
         })
     };
     let crosses = |row: &&Row| Finding::SelfIntersections.is_in(row);
