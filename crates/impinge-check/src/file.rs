@@ -58,7 +58,7 @@ impl Checked {
 
 fn checked(path: &Path, options: &Options, notes: &mut Vec<String>) -> Result<Checked, Failure> {
     let read = read_with_summary(path, &ReadOptions::as_they_are());
-    let (mesh, summary) = read.map_err(|error| Failure {
+    let (mesh, mut summary) = read.map_err(|error| Failure {
         kind: match error {
             FileError::NotFinite { .. } => ErrorKind::NotFinite,
             FileError::NoMemory { .. } => ErrorKind::Memory,
@@ -71,11 +71,11 @@ fn checked(path: &Path, options: &Options, notes: &mut Vec<String>) -> Result<Ch
         },
         message: one_line(&error.to_string()),
     })?;
-    // What is left out: units of one file and polygons of any are as good as others.
-    let mut left_out = summary;
-    (left_out.unit, left_out.n_polygons_fanned) = (None, 0);
-    *notes = left_out.notes();
-    check_mesh(mesh, options).map_err(|error| Failure {
+    // The unit of one file is as good as others.
+    summary.unit = None;
+    let n_polygons = std::mem::take(&mut summary.n_polygons_fanned);
+    *notes = summary.notes();
+    let checked = check_mesh(mesh, options).map_err(|error| Failure {
         kind: match error {
             impinge::Error::NonFinitePosition { .. } => ErrorKind::NotFinite,
             // Threads fail to start if there is no memory for their stacks.
@@ -83,7 +83,13 @@ fn checked(path: &Path, options: &Options, notes: &mut Vec<String>) -> Result<Ch
             _ => ErrorKind::Refused,
         },
         message: one_line(&error.to_string()),
-    })
+    })?;
+    // Polygons are as good as triangles, but numbers of elements are those of triangles.
+    if !checked.places.is_empty() {
+        summary.n_polygons_fanned = n_polygons;
+        *notes = summary.notes();
+    }
+    Ok(checked)
 }
 
 fn one_line(text: &str) -> String {

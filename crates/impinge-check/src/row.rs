@@ -141,8 +141,9 @@ pub struct Row {
     /// Which problems each element has: see [`Options::marks`](crate::Options::marks). Not part
     /// of the [object](Self::to_json).
     pub marks: Option<MarkRuns>,
-    /// What was left out of the file: see
-    /// [`Summary::notes`](impinge_io::Summary::notes). Not part of the [object](Self::to_json).
+    /// What was left out of the file, and, if places name elements, how many polygons were split:
+    /// see [`Summary::notes`](impinge_io::Summary::notes). Not part of the
+    /// [object](Self::to_json).
     pub notes: Vec<String>,
 }
 

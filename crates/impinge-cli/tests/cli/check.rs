@@ -1107,6 +1107,18 @@ fn one_of_several_closed_pieces_that_is_inside_out_is_found() {
 }
 
 #[test]
+fn polygons_that_are_split_are_noted() {
+    let folder = Folder::new();
+    let quad = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+    folder.text("quad.obj", quad);
+    for more in [&[][..], &["--json"]] {
+        let run = folder.run([&["check", "quad.obj"], more].concat());
+        let note = "note: quad.obj: polygons split into triangles (element numbers count the triangles): 1\n";
+        assert_eq!((run.code, run.stderr.as_str()), (Some(0), note));
+    }
+}
+
+#[test]
 fn meshes_on_standard_input_are_refused_by_that_name() {
     let folder = Folder::new();
     let only_files = "check reads meshes from files only, not from standard input";
