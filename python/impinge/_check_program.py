@@ -25,6 +25,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     paths = args.meshes + ([] if args.list is None else _listed(args.list))
     if not paths and args.list is None:
         _parser().error("the following arguments are required: MESH")
+    if not paths:
+        _parser().error(f"--list {args.list}: it names no mesh")
     if "thin" in args.fail_on and args.min_thickness is None and len(args.fail_on) < len(_FINDINGS):
         _parser().error("--fail-on thin: --min-thickness T says how thin")
     if args.rows is not None and _suffix(args.rows) not in ("csv", "jsonl", "parquet"):

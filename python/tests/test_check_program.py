@@ -104,6 +104,8 @@ def test_a_list(folder):
     out = run("--list", "-", "--json", input="# a comment\n\nclean.obj\r\nbad.obj\n")
     assert [json.loads(line)["path"] for line in out.stdout.splitlines()] == ["clean.obj", "bad.obj"]
     assert run("--list", "absent.txt").returncode == 1
+    out = run("--list", "-", input="# a comment\n")
+    assert out.returncode == 2 and out.stderr.endswith("--list -: it names no mesh\n")
 
 
 def test_annotations_and_a_summary(folder):

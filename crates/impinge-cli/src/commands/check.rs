@@ -195,6 +195,10 @@ fn paths(args: &CheckArgs) -> Result<Vec<PathBuf>, Error> {
             }
         }
     }
+    if let (Some(list), true) = (&args.list, paths.is_empty()) {
+        let text = format!("--list {}: it names no mesh", printable(list));
+        return Err(Error::Usage(text));
+    }
     if args.rank >= args.world_size.get() {
         return Err(Error::Usage(format!(
             "--rank {} of --world-size {}: ranks start at 0",

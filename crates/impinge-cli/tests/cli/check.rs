@@ -1119,6 +1119,17 @@ fn polygons_that_are_split_are_noted() {
 }
 
 #[test]
+fn a_list_that_names_no_mesh_is_an_error() {
+    let folder = Folder::new();
+    folder.text("none.txt", "# nothing\n\n");
+    folder.text("closed.obj", CLOSED);
+    let message = folder.run(["check", "--list", "none.txt"]).misuse();
+    assert_eq!(message, "impinge: --list none.txt: it names no mesh\n");
+    let both = ["check", "closed.obj", "--list", "none.txt"];
+    assert_eq!(folder.run(both).code, Some(0));
+}
+
+#[test]
 fn meshes_on_standard_input_are_refused_by_that_name() {
     let folder = Folder::new();
     let only_files = "check reads meshes from files only, not from standard input";
