@@ -21,7 +21,7 @@ use impinge_check::{
 use impinge_io::printable;
 
 pub use self::args::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FailOn};
-pub use self::ending::fail;
+pub use self::ending::{fail, quoted};
 use crate::apart::Inputs;
 use crate::error::Error;
 use crate::load::{STDIN, tell};
@@ -74,7 +74,7 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         Some(args::Out::Folder(folder)) => kept(args, folder, &paths, &watch, cancel)?,
         _ => {
             let mut rows = Ordered::new(args.json, &mine);
-            run(args, &paths, &mine, cancel, |ix, row| {
+            run((args, args.keep_seams), &paths, &mine, cancel, |ix, row| {
                 watch.frame_done();
                 rows.put(ix, row)
             })?;
@@ -108,7 +108,8 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
             if matches!(args.out, Some(args::Out::Mesh(_))) {
                 shown::print_legend()?;
             }
-            ending::print_next(&rows, args)?;
+            let keeps = seams_keep_apart(args, &rows, cancel)?;
+            ending::print_next(&rows, keeps, args)?;
         }
     }
     if let Some(file) = &args.rows {
@@ -231,7 +232,7 @@ fn share(args: &CheckArgs, n: usize) -> impl Iterator<Item = usize> {
 
 /// Checks the meshes numbered `wanted`.
 fn run(
-    args: &CheckArgs,
+    (args, keep_seams): (&CheckArgs, bool),
     paths: &[PathBuf],
     wanted: &[usize],
     cancel: &CancelToken,
@@ -253,7 +254,7 @@ fn run(
         if args.no_weld {
             command.arg("--no-weld");
         }
-        if args.keep_seams {
+        if keep_seams {
             command.arg("--keep-seams");
         }
         command.arg("--places").arg(args.places.to_string());
@@ -275,7 +276,7 @@ fn run(
         command: &command,
         jobs,
         timeout: args.timeout.map(Duration::from_secs_f64),
-        weld: !args.no_weld && !args.keep_seams,
+        weld: !args.no_weld && !keep_seams,
     };
     let chosen: Vec<PathBuf> = wanted.iter().map(|&ix| paths[ix].clone()).collect();
     // A row that can't be printed or stored stops the run.
@@ -332,12 +333,33 @@ fn mark(args: &CheckArgs, rows: &mut [Row], cancel: &CancelToken) -> Result<(), 
     let mut bare: Vec<&mut Row> = rows.iter_mut().filter(is_bare).collect();
     let paths: Vec<PathBuf> = bare.iter().map(|row| PathBuf::from(&row.path)).collect();
     let all: Vec<usize> = (0..paths.len()).collect();
-    run(args, &paths, &all, cancel, |ix, row| {
+    run((args, args.keep_seams), &paths, &all, cancel, |ix, row| {
         if row.result == bare[ix].result {
             bare[ix].marks = row.marks;
         }
         Ok(())
     })
+}
+
+/// Whether the first mesh that `fix` would mend needs no mending if vertices at one position stay
+/// apart, as in what `fix` has split. It is checked once more, within the same limits, if that may
+/// be: a vertex of a closed mesh belongs to about six faces, one of a soup to one.
+fn seams_keep_apart(args: &CheckArgs, rows: &[Row], cancel: &CancelToken) -> Result<bool, Error> {
+    let Some(row) = ending::mendable(rows, args).filter(|row| ending::may_have_seams(row)) else {
+        return Ok(false);
+    };
+    let mut keeps = false;
+    run(
+        (args, true),
+        &[PathBuf::from(&row.path)],
+        &[0],
+        cancel,
+        |_, again| {
+            keeps = again.result.is_ok() && !ending::is_mendable(&again);
+            Ok(())
+        },
+    )?;
+    Ok(keeps)
 }
 
 /// Checks the meshes without a row in the folder; returns all rows of this process.
@@ -359,11 +381,17 @@ fn kept(
     }
     // A request to stop waits until all finished rows are written.
     let _patience = Patience::new();
-    let ran = run(args, paths, &missing, cancel, |ix, row| {
-        watch.frame_done();
-        printed.put(ix, row.clone())?;
-        Ok(store.put(ix, row)?)
-    });
+    let ran = run(
+        (args, args.keep_seams),
+        paths,
+        &missing,
+        cancel,
+        |ix, row| {
+            watch.frame_done();
+            printed.put(ix, row.clone())?;
+            Ok(store.put(ix, row)?)
+        },
+    );
     store.flush()?;
     ran?;
     Ok(printed.finish())

@@ -16,7 +16,7 @@ use serde_json::{Map, Value, json};
 
 pub use self::args::{FIX_EXAMPLES, FixArgs};
 use crate::apart::Inputs;
-use crate::commands::check::{FailOn, fail};
+use crate::commands::check::{FailOn, fail, quoted};
 use crate::error::Error;
 use crate::load::{NAME_OF_STDIN, STDIN, format_of_stdin, stdin_bytes, tell};
 use crate::output;
@@ -251,7 +251,8 @@ fn text(args: &FixArgs, options: &FixOptions, fixed: &Fixed, summary: &Summary) 
     } else {
         ""
     };
-    text += &format!("next: impinge check {}{seams}\n", printable(&args.out.path));
+    let out = quoted(&args.out.path.to_string_lossy());
+    text += &format!("next: impinge check {out}{seams}\n");
     text
 }
 

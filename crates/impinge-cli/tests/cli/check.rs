@@ -1130,6 +1130,46 @@ fn a_list_that_names_no_mesh_is_an_error() {
 }
 
 #[test]
+fn what_fix_has_split_is_checked_with_seams_next() {
+    let folder = Folder::new();
+    // Two tetrahedra with a common vertex.
+    let second = "v -1 0 0\nv 0 -1 0\nv 0 0 -1\nf 1 5 6\nf 1 7 5\nf 5 7 6\nf 1 6 7\n";
+    folder.text("share1.obj", &format!("{CLOSED}{second}"));
+    let last = |args: &[&str]| -> String {
+        let text = folder.run(args).printed();
+        text.lines().last().unwrap().to_owned()
+    };
+    let mends = "next: impinge fix share1.obj --out share1-mended.ply";
+    assert_eq!(last(&["check", "share1.obj"]), mends);
+    let seams = "next: impinge check share1-f.obj --keep-seams";
+    assert_eq!(last(&["fix", "share1.obj", "--out", "share1-f.obj"]), seams);
+    assert_eq!(last(&["check", "share1-f.obj"]), seams);
+    let check = ["check", "share1-f.obj", "--keep-seams"];
+    assert_eq!(last(&check), "1 mesh: clean");
+    // Its vertices belong to one face each.
+    folder
+        .run(["fix", "share1.obj", "--out", "soup.stl"])
+        .printed();
+    let mends = "next: impinge fix soup.stl --out soup-mended.ply";
+    assert_eq!(last(&["check", "soup.stl"]), mends);
+}
+
+#[test]
+fn the_next_command_takes_any_name() {
+    let folder = Folder::new();
+    let last = |args: &[&str]| -> String {
+        let text = folder.run(args).printed();
+        text.lines().last().unwrap().to_owned()
+    };
+    folder.text("-d.obj", MIXED);
+    let mends = "next: impinge fix ./-d.obj --out ./-d-mended.ply";
+    assert_eq!(last(&["check", "./-d.obj"]), mends);
+    assert_eq!(last(&["check", "--", "-d.obj"]), mends);
+    let checks = "next: impinge check 'd 2.obj'";
+    assert_eq!(last(&["fix", "./-d.obj", "--out", "d 2.obj"]), checks);
+}
+
+#[test]
 fn meshes_on_standard_input_are_refused_by_that_name() {
     let folder = Folder::new();
     let only_files = "check reads meshes from files only, not from standard input";
