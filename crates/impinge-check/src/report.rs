@@ -170,10 +170,20 @@ impl Report<'_> {
     fn with(&self, findings: &[Finding]) -> Vec<String> {
         let all = Finding::ALL.into_iter().filter(|it| findings.contains(it));
         let counts = all.map(|finding| (finding, self.n(|row| finding.is_in(row))));
-        let found = counts.filter(|&(_, n)| n > 0);
-        found
-            .map(|(finding, n)| format!("{} with {}", grouped(n), finding.words()))
-            .collect()
+        let found: Vec<(Finding, u64)> = counts.filter(|&(_, n)| n > 0).collect();
+        // What is not finite is an error too.
+        let has_errors = found.iter().any(|&(finding, _)| finding == Finding::Error);
+        let not_finite = found.iter().find(|&&(finding, _)| finding == Finding::Nan);
+        let not_finite = not_finite.filter(|_| has_errors).map(|&(_, n)| grouped(n));
+        let said = |&(finding, n): &(Finding, u64)| {
+            let said = format!("{} with {}", grouped(n), finding.words());
+            match (finding, &not_finite) {
+                (Finding::Nan, Some(_)) => None,
+                (Finding::Error, Some(n)) => Some(format!("{said} ({n} not finite)")),
+                _ => Some(said),
+            }
+        };
+        found.iter().filter_map(said).collect()
     }
 
     fn n(&self, is_it: impl Fn(&Row) -> bool) -> u64 {

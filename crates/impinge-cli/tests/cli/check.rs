@@ -105,7 +105,7 @@ fn a_table_and_what_it_sums_up_to() {
     assert_eq!(
         last,
         "3 meshes: 1 without any finding, 1 with self-intersections, 1 with an open border, \
-         1 with coordinates that are not finite, 1 with an error"
+         1 with an error (1 not finite)"
     );
     for (names, last) in [
         (&["closed.obj"][..], "1 mesh: clean"),
