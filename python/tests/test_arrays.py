@@ -415,7 +415,7 @@ def test_nothing_is_no_rows():
     assert scene.n_elements(scene.add_points([])) == 0
     body = scene.add(TRIANGLE, FACE)
     assert len(impinge.Detector("cpu").cast(scene, [], [])) == 0
-    with pytest.raises(ValueError, match="0 positions given, but it has 3 vertices"):
+    with pytest.raises(ValueError, match="^vertices: 0 positions given, but body 2 has 3 vertices"):
         scene.set_positions(body, [])
     with pytest.raises(ValueError, match=r"^vertices: shape \(n, 3\) expected, \(2,\) given"):
         scene.add([1.0, 2.0], FACE)
