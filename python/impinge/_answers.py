@@ -230,7 +230,7 @@ class _Rows(_Answer):
     __slots__ = ("_rows",)
 
     def __init__(self, inner: Any) -> None:
-        self._inner = inner
+        super().__init__(inner)
         self._rows: npt.NDArray[np.uint32] | None = None
 
     def __len__(self) -> int:
@@ -249,7 +249,7 @@ class Pairs(_Rows):
     _inner: _impinge.Pairs
 
     def __init__(self, inner: _impinge.Pairs) -> None:
-        self._inner, self._rows = inner, None
+        super().__init__(inner)
         self._hash: int | None = None
 
     @property
@@ -451,7 +451,7 @@ class _OfKinds(_Rows):
     __slots__ = ("_kinds",)
 
     def __init__(self, inner: Any) -> None:
-        self._inner, self._rows = inner, None
+        super().__init__(inner)
         self._kinds: npt.NDArray[np.uint8] | None = None
 
     @property
@@ -884,7 +884,7 @@ class Neighbours(_Answer):
     _inner: _impinge.Neighbours
 
     def __init__(self, inner: _impinge.Neighbours) -> None:
-        self._inner = inner
+        super().__init__(inner)
         self._lists: dict[tuple[str, bool], Csr] = {}
         self._rooms: dict[tuple[str, bool], Csr] = {}
 

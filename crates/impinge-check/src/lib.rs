@@ -1,7 +1,6 @@
 //! Checks meshes for self-intersections, degenerate and duplicate elements, non-manifold places,
 //! open borders, inconsistent orientation and closed pieces that are inside out, and counts their
-//! pieces. Every count is exact: there
-//! is no tolerance anywhere.
+//! pieces. Every count is exact: there is no tolerance anywhere.
 //!
 //! [`check_mesh`] checks one mesh in memory, [`check_file`] one file. For a dataset of many files
 //! use
